@@ -1,0 +1,3 @@
+//! What surrounds the core: loaders, scene makers, a renderer, an exact oracle, statistics.
+
+pub mod model;

@@ -1,0 +1,111 @@
+//! Every reason why a build, or the opening of a block, is refused.
+
+use core::fmt;
+
+/// Why a build was refused. Nothing was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum BuildError {
+    /// A vertex index of a mesh is not below its vertex count.
+    IndexOutOfRange {
+        /// The mesh.
+        mesh: u32,
+        /// The first triangle with such an index.
+        triangle: u32,
+    },
+    /// A mesh without indices has fewer than three vertices a triangle.
+    VerticesMissing {
+        /// The mesh.
+        mesh: u32,
+    },
+    /// The memory is smaller than the least that the build can use.
+    OutOfMemory {
+        /// That least size, in bytes.
+        minimum: usize,
+    },
+    /// The memory does not start at a multiple of 64 bytes.
+    Misaligned,
+    /// The scene has more primitives than 32 bits can number, or asks for more memory than the
+    /// machine can address.
+    TooLarge,
+    /// The option is part of the interface but not of this version.
+    Unsupported(Unsupported),
+}
+
+/// What this version cannot do yet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unsupported {
+    /// A quality other than balanced.
+    Quality,
+    /// A layout other than compact.
+    Layout,
+    /// Refitting.
+    Refit,
+}
+
+/// Why a block was not opened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum OpenError {
+    /// The memory does not start at a multiple of 64 bytes.
+    Misaligned,
+    /// The bytes do not begin as a block does.
+    NotABlock,
+    /// The block was written on a machine of the other byte order.
+    ByteOrder,
+    /// The block is of another version of the format.
+    Version,
+    /// Fewer bytes than the block says it has.
+    Truncated,
+    /// The block holds a layout that this build of the library leaves out.
+    Layout,
+    /// The contents contradict themselves.
+    Corrupt,
+}
+
+impl fmt::Display for BuildError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            BuildError::IndexOutOfRange { mesh, triangle } => {
+                write!(f, "triangle {triangle} of mesh {mesh} has a vertex index out of range")
+            }
+            BuildError::VerticesMissing { mesh } => {
+                write!(f, "mesh {mesh} has no indices and fewer than three vertices a triangle")
+            }
+            BuildError::OutOfMemory { minimum } => {
+                write!(f, "the memory is too small: {minimum} bytes are the least")
+            }
+            BuildError::Misaligned => f.write_str("the memory is not aligned to 64 bytes"),
+            BuildError::TooLarge => f.write_str("the scene is too large to be numbered or stored"),
+            BuildError::Unsupported(what) => write!(f, "this version cannot build it: {what}"),
+        }
+    }
+}
+
+impl fmt::Display for Unsupported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Unsupported::Quality => "only the balanced quality exists so far",
+            Unsupported::Layout => "only the compact layout exists so far",
+            Unsupported::Refit => "blocks cannot be refitted yet",
+        })
+    }
+}
+
+impl fmt::Display for OpenError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            OpenError::Misaligned => "the block is not aligned to 64 bytes",
+            OpenError::NotABlock => "the bytes are not a raykern block",
+            OpenError::ByteOrder => "the block was written on a machine of the other byte order",
+            OpenError::Version => "the block is of another version of the format",
+            OpenError::Truncated => "the block is longer than the bytes given",
+            OpenError::Layout => "this build of the library leaves out the block's layout",
+            OpenError::Corrupt => "the block's contents contradict themselves",
+        })
+    }
+}
+
+impl core::error::Error for BuildError {}
+impl core::error::Error for OpenError {}

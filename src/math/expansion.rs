@@ -1,0 +1,1 @@
+//! The exact sign of a sum of floats.

@@ -1,0 +1,19 @@
+//! The operations that `core` leaves to a library: chosen here and nowhere else.
+//!
+//! All of them are exact or correctly rounded, so both choices give the same bits.
+
+/// The correctly rounded square root.
+pub(crate) fn sqrt(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return std::primitive::f64::sqrt(x);
+    #[cfg(not(feature = "std"))]
+    return libm::sqrt(x);
+}
+
+/// The largest integer not above `x`.
+pub(crate) fn floor(x: f64) -> f64 {
+    #[cfg(feature = "std")]
+    return std::primitive::f64::floor(x);
+    #[cfg(not(feature = "std"))]
+    return libm::floor(x);
+}

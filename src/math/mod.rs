@@ -1,0 +1,8 @@
+//! Floats and boxes; nothing here knows of rays.
+
+pub(crate) mod aabb;
+pub(crate) mod expansion;
+pub(crate) mod float;
+pub(crate) mod rounding;
+
+pub(crate) use aabb::Aabb;

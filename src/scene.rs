@@ -1,0 +1,161 @@
+//! What a build reads: meshes and sphere sets that stay the caller's.
+
+use crate::error::BuildError;
+
+/// Elements of a few words each, at equal distances in the caller's memory.
+///
+/// Element `i` is `words[i * stride ..][.. N]`. Words between elements are never read.
+#[derive(Clone, Copy, Debug)]
+pub struct Strided<'a, T> {
+    words: &'a [T],
+    stride: usize,
+    count: usize,
+}
+
+impl<'a, T: Copy> Strided<'a, T> {
+    /// `count` elements of `width` words, `stride` words apart.
+    ///
+    /// `None` when `words` ends before the last element does, or when `stride < width` with more
+    /// than one element.
+    pub fn new(words: &'a [T], width: usize, stride: usize, count: usize) -> Option<Self> {
+        let needed = match count {
+            0 => 0,
+            n => (n - 1).checked_mul(stride)?.checked_add(width)?,
+        };
+        let overlap = count > 1 && stride < width;
+        (needed <= words.len() && !overlap).then_some(Strided { words, stride, count })
+    }
+
+    /// The number of elements.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Whether there are no elements.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Element `i`, or `None` beyond the last one.
+    pub fn get<const N: usize>(&self, i: usize) -> Option<[T; N]> {
+        if i >= self.count {
+            return None;
+        }
+        self.words.get(i * self.stride..)?.first_chunk::<N>().copied()
+    }
+}
+
+/// Triangles over vertices, with or without indices.
+#[derive(Clone, Copy, Debug)]
+pub struct Mesh<'a> {
+    vertices: Strided<'a, f32>,
+    indices: Option<Strided<'a, u32>>,
+    triangle_count: usize,
+    mask: u32,
+}
+
+impl<'a> Mesh<'a> {
+    /// Triangles that name their vertices by number.
+    pub fn indexed(vertices: &'a [[f32; 3]], indices: &'a [[u32; 3]]) -> Self {
+        let vertices = packed(vertices);
+        let indices = packed(indices);
+        Mesh { vertices, indices: Some(indices), triangle_count: indices.len(), mask: 0 }
+    }
+
+    /// Triangles whose vertices stand in threes.
+    pub fn soup(triangles: &'a [[[f32; 3]; 3]]) -> Self {
+        let vertices = packed(triangles.as_flattened());
+        Mesh { vertices, indices: None, triangle_count: triangles.len(), mask: 0 }
+    }
+
+    /// Vertices and, unless they stand in threes, indices at any distance in memory.
+    ///
+    /// `vertices` has elements of three words, `indices` too. With indices, `triangle_count` must
+    /// not exceed their number.
+    pub fn strided(
+        vertices: Strided<'a, f32>,
+        indices: Option<Strided<'a, u32>>,
+        triangle_count: usize,
+    ) -> Self {
+        Mesh { vertices, indices, triangle_count, mask: 0 }
+    }
+
+    /// The same mesh, seen only by queries whose mask shares a bit with `mask`; 0: by all.
+    pub fn with_mask(self, mask: u32) -> Self {
+        Mesh { mask, ..self }
+    }
+
+    /// The number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.triangle_count
+    }
+
+    /// The mask; 0 is seen by every query.
+    pub fn mask(&self) -> u32 {
+        self.mask
+    }
+
+    /// The vertices of triangle `i`, or `None` when it or one of its vertices does not exist.
+    pub fn triangle(&self, i: usize) -> Option<[[f32; 3]; 3]> {
+        let corner = |v: usize| self.vertices.get::<3>(v);
+        let [a, b, c] = match &self.indices {
+            Some(indices) => indices.get::<3>(i)?.map(|v| v as usize),
+            None => [3 * i, 3 * i + 1, 3 * i + 2],
+        };
+        Some([corner(a)?, corner(b)?, corner(c)?])
+    }
+}
+
+/// Spheres, each `x y z radius`.
+#[derive(Clone, Copy, Debug)]
+pub struct SphereSet<'a> {
+    spheres: Strided<'a, f32>,
+    mask: u32,
+}
+
+impl<'a> SphereSet<'a> {
+    /// Spheres `[x, y, z, radius]`, one after the other.
+    pub fn new(spheres: &'a [[f32; 4]]) -> Self {
+        SphereSet { spheres: packed(spheres), mask: 0 }
+    }
+
+    /// Spheres of four words each at any distance in memory.
+    pub fn strided(spheres: Strided<'a, f32>) -> Self {
+        SphereSet { spheres, mask: 0 }
+    }
+
+    /// The same spheres, seen only by queries whose mask shares a bit with `mask`; 0: by all.
+    pub fn with_mask(self, mask: u32) -> Self {
+        SphereSet { mask, ..self }
+    }
+
+    /// The number of spheres.
+    pub fn sphere_count(&self) -> usize {
+        self.spheres.len()
+    }
+
+    /// The mask; 0 is seen by every query.
+    pub fn mask(&self) -> u32 {
+        self.mask
+    }
+
+    /// Sphere `i` as `[x, y, z, radius]`.
+    pub fn sphere(&self, i: usize) -> Option<[f32; 4]> {
+        self.spheres.get::<4>(i)
+    }
+}
+
+/// Everything that can be hit. Either list may be empty.
+///
+/// Geometries are numbered: the meshes first, then the sphere sets.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Scene<'a> {
+    /// The meshes.
+    pub meshes: &'a [Mesh<'a>],
+    /// The sphere sets.
+    pub sphere_sets: &'a [SphereSet<'a>],
+}
+
+fn packed<T: Copy, const N: usize>(elements: &[[T; N]]) -> Strided<'_, T> {
+    Strided { words: elements.as_flattened(), stride: N, count: elements.len() }
+}
