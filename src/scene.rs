@@ -148,12 +148,68 @@ impl<'a> SphereSet<'a> {
 /// Everything that can be hit. Either list may be empty.
 ///
 /// Geometries are numbered: the meshes first, then the sphere sets.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Scene<'a> {
-    /// The meshes.
-    pub meshes: &'a [Mesh<'a>],
-    /// The sphere sets.
-    pub sphere_sets: &'a [SphereSet<'a>],
+#[derive(Clone, Copy)]
+pub struct Scene<'a>(Source<'a>);
+
+/// Where the geometries come from: slices, or arrays in another language's types that are read
+/// element by element.
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    Slices { meshes: &'a [Mesh<'a>], sphere_sets: &'a [SphereSet<'a>] },
+    Foreign(&'a dyn Geometries<'a>),
+}
+
+/// Geometries that are made when they are asked for.
+pub(crate) trait Geometries<'a> {
+    fn mesh_count(&self) -> usize;
+    fn mesh(&self, i: usize) -> Option<Mesh<'a>>;
+    fn sphere_set_count(&self) -> usize;
+    fn sphere_set(&self, i: usize) -> Option<SphereSet<'a>>;
+}
+
+impl<'a> Scene<'a> {
+    /// A scene of these meshes and sphere sets.
+    pub const fn new(meshes: &'a [Mesh<'a>], sphere_sets: &'a [SphereSet<'a>]) -> Self {
+        Scene(Source::Slices { meshes, sphere_sets })
+    }
+
+    /// A scene whose geometries are made when they are asked for.
+    #[cfg_attr(not(feature = "capi"), expect(dead_code, reason = "only the C face needs it"))]
+    pub(crate) const fn foreign(geometries: &'a dyn Geometries<'a>) -> Self {
+        Scene(Source::Foreign(geometries))
+    }
+
+    /// The number of meshes.
+    pub fn mesh_count(&self) -> usize {
+        match self.0 {
+            Source::Slices { meshes, .. } => meshes.len(),
+            Source::Foreign(geometries) => geometries.mesh_count(),
+        }
+    }
+
+    /// Mesh `i`, or `None` beyond the last one.
+    pub fn mesh(&self, i: usize) -> Option<Mesh<'a>> {
+        match self.0 {
+            Source::Slices { meshes, .. } => meshes.get(i).copied(),
+            Source::Foreign(geometries) => geometries.mesh(i),
+        }
+    }
+
+    /// The number of sphere sets.
+    pub fn sphere_set_count(&self) -> usize {
+        match self.0 {
+            Source::Slices { sphere_sets, .. } => sphere_sets.len(),
+            Source::Foreign(geometries) => geometries.sphere_set_count(),
+        }
+    }
+
+    /// Sphere set `i`, or `None` beyond the last one.
+    pub fn sphere_set(&self, i: usize) -> Option<SphereSet<'a>> {
+        match self.0 {
+            Source::Slices { sphere_sets, .. } => sphere_sets.get(i).copied(),
+            Source::Foreign(geometries) => geometries.sphere_set(i),
+        }
+    }
 }
 
 fn packed<T: Copy, const N: usize>(elements: &[[T; N]]) -> Strided<'_, T> {

@@ -27,7 +27,7 @@ impl Model {
             self.meshes.iter().map(|m| Mesh::indexed(&m.vertices, &m.indices)).collect();
         let sphere_sets: Vec<SphereSet> =
             self.sphere_sets.iter().map(|s| SphereSet::new(s)).collect();
-        f(&Scene { meshes: &meshes, sphere_sets: &sphere_sets })
+        f(&Scene::new(&meshes, &sphere_sets))
     }
 
     /// The number of triangles.
