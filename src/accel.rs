@@ -2,13 +2,18 @@
 
 use core::mem::MaybeUninit;
 
-use crate::error::{BuildError, OpenError};
-use crate::query::QueryOptions;
-use crate::ray::{Hit, Ray};
+use crate::block::{Block, Census, Header, KIND_BVH, KIND_GRID, KIND_LIST};
+use crate::error::{BuildError, OpenError, Unsupported};
+use crate::prim::{self, Leaves, Survey, survey};
+use crate::query::{
+    Any, Candidate, Closest, Counted, Counts, Filter, Locate, PrimId, Query, QueryOptions,
+    flat_number, geometry_of,
+};
+use crate::ray::{Hit, NONE, PreparedRay, Ray};
 use crate::scene::Scene;
-
-/// Every block starts at a multiple of this many bytes.
-pub const ALIGNMENT: usize = 64;
+use crate::storage::{self, ALIGNMENT};
+use crate::surface::{self, Surface};
+use crate::{bvh, grid, list};
 
 /// How much memory a build wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,137 +113,321 @@ pub struct Info {
     pub id_size: usize,
 }
 
-/// What a query did, for charts and heat maps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counts {
-    /// Boxes of BVH nodes, or cells of a grid, looked at.
-    pub steps: u64,
-    /// Leaf blocks opened.
-    pub blocks: u64,
-    /// Triangles and spheres tested.
-    pub tests: u64,
-}
-
-/// The surface at a hit, in world space.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
-    /// The point of the hit, rounded.
-    pub position: [f32; 3],
-    /// Bound on the distance of `position` from the surface, along each axis.
-    pub position_error: f32,
-    /// Unit normal: `(v1 - v0) x (v2 - v0)`, or outward on spheres; never flipped to the ray.
-    pub normal: [f32; 3],
-    /// `position` moved off the surface to the side of the normal.
-    pub front_origin: [f32; 3],
-    /// `position` moved off the surface to the other side.
-    pub back_origin: [f32; 3],
-}
-
 /// A built structure: a view of one block in the caller's memory.
 #[derive(Clone, Copy)]
-pub struct Accel<'m> {
-    block: &'m [u8],
-}
+pub struct Accel<'m>(Block<'m>);
 
 /// The memory [`build_bvh`] needs for `scene`.
 pub fn bvh_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError> {
-    todo!()
+    Ok(Job::new(scene, options, Structure::Bvh)?.memory)
 }
 
 /// The memory [`build_grid`] needs for `scene`.
 pub fn grid_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError> {
-    todo!()
+    Ok(Job::new(scene, options, Structure::Grid)?.memory)
 }
 
-/// Builds a BVH over `scene` at the front of `memory`, which must be aligned to 64 bytes.
+/// Builds a BVH over `scene` at the front of `memory`.
+///
+/// `memory` starts at a multiple of 64 bytes and holds at least the minimum of [`bvh_needs`]; with
+/// less than its size the leaves are larger. The finished block is [`Accel::block`]; what lies behind
+/// it is free again. On an error nothing was written.
 pub fn build_bvh<'m>(
     scene: &Scene,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    todo!()
+    Job::new(scene, options, Structure::Bvh)?.run(memory)
 }
 
-/// Builds a regular grid over `scene` at the front of `memory`, which must be aligned to 64 bytes.
+/// Builds a regular grid over `scene` at the front of `memory`.
+///
+/// `memory` starts at a multiple of 64 bytes and holds at least the minimum of [`grid_needs`]; with
+/// less than its size the grid is coarser, a fifth of its cells along each axis at a time. The
+/// finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
+/// written.
 pub fn build_grid<'m>(
     scene: &Scene,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    todo!()
+    Job::new(scene, options, Structure::Grid)?.run(memory)
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Structure {
+    List,
+    Grid,
+    Bvh,
+}
+
+/// A build that was checked and sized, but not begun.
+struct Job<'s, 'a> {
+    scene: &'s Scene<'a>,
+    survey: Survey,
+    census: Census,
+    structure: Structure,
+    memory: Memory,
+}
+
+impl<'s, 'a> Job<'s, 'a> {
+    fn new(
+        scene: &'s Scene<'a>,
+        options: &BuildOptions,
+        asked: Structure,
+    ) -> Result<Self, BuildError> {
+        options.check()?;
+        let survey = survey(scene)?;
+        let census = Census::take(scene, &survey);
+        let handful = match options.plain_list {
+            PlainList::Automatic => list::HANDFUL,
+            PlainList::Never => 0,
+            PlainList::Always => u32::MAX,
+        };
+        let structure = if census.hittable() <= handful { Structure::List } else { asked };
+        let (size, minimum) = match structure {
+            Structure::List => list::needs(&survey, &census)?,
+            Structure::Grid => grid::needs(scene, &survey, &census)?,
+            Structure::Bvh => bvh::needs(&survey, &census)?,
+        };
+        let memory = Memory { size, minimum, alignment: ALIGNMENT };
+        Ok(Job { scene, survey, census, structure, memory })
+    }
+
+    fn run<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
+        let Memory { size, minimum, alignment } = self.memory;
+        if memory.as_ptr().addr() % alignment != 0 {
+            return Err(BuildError::Misaligned);
+        }
+        if memory.len() < minimum {
+            return Err(BuildError::OutOfMemory { minimum });
+        }
+        let usable = memory.len().min(size);
+        let bytes = storage::zeroed(&mut memory[..usable]);
+        let build = match self.structure {
+            Structure::List => list::build,
+            Structure::Grid => grid::build,
+            Structure::Bvh => bvh::build,
+        };
+        build(self.scene, &self.survey, &self.census, bytes)?;
+        // A block that was just sealed splits again, so this error does not arise.
+        Block::split(bytes).map(Accel).map_err(|_| BuildError::OutOfMemory { minimum })
+    }
+}
+
+impl BuildOptions {
+    fn check(&self) -> Result<(), BuildError> {
+        let unsupported = if self.quality != Quality::Balanced {
+            Unsupported::Quality
+        } else if matches!(self.layout, Layout::Wide(_)) {
+            Unsupported::Layout
+        } else if self.refit {
+            Unsupported::Refit
+        } else {
+            return Ok(());
+        };
+        Err(BuildError::Unsupported(unsupported))
+    }
 }
 
 impl<'m> Accel<'m> {
     /// Opens a block that was built earlier, after checking it from end to end; nothing is copied.
+    ///
+    /// `block` starts at a multiple of 64 bytes and may be longer than the block in it. Whatever is
+    /// accepted can be queried without reading outside, panicking or looping; whether its boxes and
+    /// vertices make sense is not checked.
     pub fn open(block: &'m [u8]) -> Result<Self, OpenError> {
-        todo!()
+        let accel = Accel(Block::split(block)?);
+        if accel.is_sound() { Ok(accel) } else { Err(OpenError::Corrupt) }
+    }
+
+    /// The accel of a block that was just built.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn built(block: &'m [u8]) -> Accel<'m> {
+        Accel(Block::split(block).expect("a sealed block has a sound header"))
+    }
+
+    /// The accel of a block that a build or [`open`](Self::open) returned.
+    ///
+    /// # Safety
+    ///
+    /// `block` is the first byte of such a block, which nobody writes to during `'m`.
+    #[cfg(feature = "capi")]
+    #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
+    pub(crate) unsafe fn from_ptr(block: *const u8) -> Option<Accel<'m>> {
+        // SAFETY: the header is the first part of the block.
+        let size = unsafe { Block::size_at(block) };
+        // SAFETY: a block has as many bytes as its header says.
+        let bytes = unsafe { storage::from_raw(block, size) };
+        Block::split(bytes).ok().map(Accel)
+    }
+
+    fn is_sound(&self) -> bool {
+        let Block { header, geometries, grids, nodes, words, runs, .. } = self.0;
+        let leaves = self.leaves();
+        let no_grid = grids.is_empty() && words.is_empty() && runs.is_empty();
+        let structure = match header.kind {
+            KIND_LIST => no_grid && nodes.is_empty(),
+            KIND_GRID => nodes.is_empty() && grid::grid_is_sound(grids, words, runs, &leaves),
+            KIND_BVH => no_grid && bvh::tree_is_sound(nodes, &leaves),
+            _ => false,
+        };
+        let first_sphere =
+            geometries.get(header.mesh_count as usize).map_or(header.prim_limit, |g| g.first);
+        let numbered = header.mesh_count as usize <= geometries.len()
+            && header.triangle_limit == first_sphere
+            && first_sphere <= header.prim_limit;
+        let (triangles, prims) = (header.triangle_limit, header.prim_limit);
+        structure && numbered && prim::leaves_are_sound(&leaves, geometries, triangles, prims)
     }
 
     /// The block: what to copy, save or place in ROM.
     pub fn block(&self) -> &'m [u8] {
-        self.block
+        self.0.bytes
     }
 
     /// What the block holds.
     pub fn info(&self) -> Info {
-        todo!()
+        let Block { bytes, header, grids, nodes, words, runs, .. } = self.0;
+        Info {
+            kind: match header.kind {
+                KIND_GRID => Kind::Grid,
+                KIND_BVH => Kind::Bvh,
+                _ => Kind::List,
+            },
+            lower: header.bounds.lower,
+            upper: header.bounds.upper,
+            triangle_count: header.triangle_count,
+            sphere_count: header.sphere_count,
+            ignored_count: header.ignored_count,
+            resolution: grids.first().map_or([0; 3], |grid| grid.resolution),
+            size: bytes.len(),
+            structure_size: size_of_val(grids)
+                + size_of_val(nodes)
+                + size_of_val(words)
+                + size_of_val(runs),
+            leaf_size: size_of_val(self.0.triangle_blocks) + size_of_val(self.0.sphere_blocks),
+            id_size: size_of_val(self.0.prim_ids),
+        }
     }
 
-    /// The closest hit.
+    /// The closest hit: of least `t` in real numbers, and of equal ones the first by geometry and
+    /// primitive.
+    ///
+    /// In this version hits are decided in `f64`: a ray within about 1e-15 of an edge, or two
+    /// surfaces as close to each other, may be decided wrongly. `t` is the nearest float.
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        todo!()
+        self.intersect_with(ray, &QueryOptions::default())
     }
 
-    /// Whether anything is hit.
+    /// Whether anything is hit: true exactly when [`intersect`](Self::intersect) finds a hit.
     pub fn occluded(&self, ray: &Ray) -> bool {
-        todo!()
+        self.occluded_with(ray, &QueryOptions::default())
     }
 
     /// The closest hit among what `options` leaves.
     pub fn intersect_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        todo!()
+        let ray = ray.prepare()?;
+        let mut query = Closest::new(self.filter(options), &ray);
+        self.ask(&ray, &mut query);
+        query.best.map(|best| self.hit(&best))
     }
 
     /// Whether anything that `options` leaves is hit.
     pub fn occluded_with(&self, ray: &Ray, options: &QueryOptions) -> bool {
-        todo!()
+        let Some(ray) = ray.prepare() else { return false };
+        let mut query = Any::new(self.filter(options), &ray);
+        self.ask(&ray, &mut query)
+    }
+
+    /// [`intersect`](Self::intersect) for each ray; a miss is written as [`Hit::MISS`]. Stops at the
+    /// end of the shorter slice.
+    pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Hit]) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.intersect(ray).unwrap_or(Hit::MISS);
+        }
+    }
+
+    /// [`occluded`](Self::occluded) for each ray. Stops at the end of the shorter slice.
+    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
+        for (ray, occluded) in rays.iter().zip(occluded) {
+            *occluded = self.occluded(ray);
+        }
     }
 
     /// [`intersect`](Self::intersect) that adds what it did to `counts`.
     pub fn intersect_counted(&self, ray: &Ray, counts: &mut Counts) -> Option<Hit> {
-        todo!()
+        let ray = ray.prepare()?;
+        let query = Closest::new(self.filter(&QueryOptions::default()), &ray);
+        let mut counted = Counted { query, counts };
+        self.ask(&ray, &mut counted);
+        counted.query.best.map(|best| self.hit(&best))
     }
 
     /// [`occluded`](Self::occluded) that adds what it did to `counts`.
     pub fn occluded_counted(&self, ray: &Ray, counts: &mut Counts) -> bool {
-        todo!()
+        let Some(ray) = ray.prepare() else { return false };
+        let query = Any::new(self.filter(&QueryOptions::default()), &ray);
+        self.ask(&ray, &mut Counted { query, counts })
     }
 
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when
-    /// no such hit exists.
+    /// the ray has no such hit.
+    ///
+    /// The block keeps no way from a primitive's number to its place, so this follows the ray once
+    /// more: it costs about as much as the intersect call did.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
-        todo!()
+        let ray = ray.prepare()?;
+        let Hit { prim, geometry, instance, .. } = *hit;
+        let id = PrimId { prim, geometry, instance };
+        let Header { triangle_limit, prim_limit, .. } = *self.0.header;
+        let number = flat_number(&id, self.0.geometries, prim_limit)?;
+        let mut query = Locate::new(number, hit.t, &ray);
+        self.ask(&ray, &mut query);
+        let found = query.found?;
+        let (block, lane) = (found.place.0 as usize, found.place.1 as usize);
+        Some(if number < triangle_limit {
+            surface::of_triangle(self.0.triangle_blocks.get(block)?.triangle(lane), found.weights)
+        } else {
+            let (centre, radius) = self.0.sphere_blocks.get(block)?.sphere(lane);
+            surface::of_sphere(&ray, found.t, centre, radius)
+        })
+    }
+
+    /// Runs the one traversal of the structure at hand.
+    fn ask<Q: Query>(&self, ray: &PreparedRay, query: &mut Q) -> bool {
+        let Block { header, grids, nodes, words, runs, .. } = self.0;
+        let leaves = self.leaves();
+        match (header.kind, grids.first()) {
+            (KIND_BVH, _) => bvh::traverse(nodes, &leaves, ray, query),
+            (KIND_GRID, Some(grid)) => grid::walk(grid, words, runs, &leaves, ray, query),
+            _ => leaves.intersect_all(ray, query),
+        }
+    }
+
+    fn leaves(&self) -> Leaves<'m> {
+        let Block { triangle_blocks, sphere_blocks, prim_ids, .. } = self.0;
+        Leaves { triangle_blocks, sphere_blocks, prim_ids }
+    }
+
+    fn filter(&self, options: &QueryOptions) -> Filter<'m> {
+        Filter::new(options, self.0.geometries, self.0.header.prim_limit)
+    }
+
+    /// The record of a candidate that won.
+    fn hit(&self, best: &Candidate) -> Hit {
+        let place = geometry_of(best.prim, self.0.geometries);
+        let (geometry, first) = place.map_or((NONE, 0), |(number, g)| (number, g.first));
+        let [u, v] = rounded_weights(best.weights);
+        // Adding +0 turns -0 into +0.
+        Hit { t: best.t as f32 + 0.0, u, v, prim: best.prim - first, geometry, instance: NONE }
     }
 }
 
-/// A structure in memory of its own.
-#[cfg(feature = "alloc")]
-pub struct OwnedAccel {}
-
-#[cfg(feature = "alloc")]
-impl OwnedAccel {
-    /// Builds a BVH.
-    pub fn bvh(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
-        todo!()
-    }
-
-    /// Builds a grid.
-    pub fn grid(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
-        todo!()
-    }
-
-    /// The structure.
-    pub fn accel(&self) -> Accel<'_> {
-        todo!()
-    }
+/// The weights of the second and third vertex as floats, such that neither they nor `1 - u - v` are
+/// negative: each is the nearest float to its value in `f64`, and `v` gives way.
+fn rounded_weights([u, v]: [f64; 2]) -> [f32; 2] {
+    let u = (u as f32).clamp(0.0, 1.0) + 0.0;
+    let v = (v as f32).clamp(0.0, 1.0 - u) + 0.0;
+    [u, v]
 }

@@ -1,7 +1,41 @@
-//! A ray-intersection core.
+//! A ray-intersection core to embed: a regular grid and a bounding volume hierarchy over triangles
+//! and spheres, in memory that the caller owns.
+//!
+//! ```
+//! use raykern::{BuildOptions, Mesh, OwnedAccel, Ray, Scene};
+//!
+//! let vertices = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+//! let meshes = [Mesh::indexed(&vertices, &[[0, 1, 2]])];
+//! let scene = Scene::new(&meshes, &[]);
+//! let built = OwnedAccel::bvh(&scene, &BuildOptions::default())?;
+//! let ray = Ray::new([0.25, 0.25, 2.0], [0.0, 0.0, -1.0]);
+//! let hit = built.accel().intersect(&ray).expect("the ray points at the triangle");
+//! assert_eq!((hit.t, hit.u, hit.v, hit.prim), (2.0, 0.25, 0.25, 0));
+//! # Ok::<(), raykern::BuildError>(())
+//! ```
+//!
+//! - [`Scene`] borrows meshes and sphere sets; [`build_bvh`] and [`build_grid`] read them into one
+//!   block in memory that the caller passes in, and [`bvh_needs`] and [`grid_needs`] say how much.
+//!   A handful of primitives becomes a plain list.
+//! - [`Accel`] is a view of such a block: [`Accel::intersect`], [`Accel::occluded`] and their
+//!   relatives. All of them take `&self`, allocate nothing and may run on many threads at once.
+//! - A block holds no pointers: it may be copied, saved, mapped, and [opened](Accel::open) again.
+//!
+//! List, grid and BVH give the same answers, to the bit, for a scene and a ray: see
+//! [`Accel::intersect`] for what is promised of them in this version.
+//!
+//! # Features
+//!
+//! | feature | adds | costs |
+//! |---|---|---|
+//! | `std` (default) | `alloc`; square roots from std; panics stopped at the C boundary | std |
+//! | `alloc` | [`OwnedAccel`] | a global allocator |
+//! | `libm` | square roots without std | the crate libm |
+//! | `capi` | the C entry points `rt_...` of `include/raykern.h` | about 20 kB |
+//! | `capi-panic` | a panic handler, for a C library without std | a few bytes |
+//! | `header` | development: writes the C header again | the crate cbindgen |
 
 #![no_std]
-#![allow(unused, missing_docs)]
 
 #[cfg(feature = "alloc")]
 extern crate alloc;
@@ -12,14 +46,29 @@ extern crate std;
 compile_error!("raykern needs square roots: enable the feature `std` or the feature `libm`");
 
 mod accel;
+mod block;
+mod bvh;
 mod error;
+mod grid;
+mod list;
 mod math;
+#[cfg(feature = "alloc")]
+mod owned;
+mod prim;
 mod query;
 mod ray;
 mod scene;
+mod storage;
+mod surface;
 
-pub use accel::*;
+pub use accel::{
+    Accel, BuildOptions, Info, Kind, Layout, Memory, PlainList, Quality, build_bvh, build_grid,
+    bvh_needs, grid_needs,
+};
 pub use error::{BuildError, OpenError, Unsupported};
-pub use query::{Facing, PrimId, QueryOptions};
+#[cfg(feature = "alloc")]
+pub use owned::OwnedAccel;
+pub use query::{Counts, Facing, PrimId, QueryOptions};
 pub use ray::{Hit, NONE, Ray};
 pub use scene::{Mesh, Scene, SphereSet, Strided};
+pub use surface::Surface;

@@ -1,5 +1,8 @@
 //! What a ray may ask: its options, and the traversal's side of the question.
 
+use crate::ray::{NONE, PreparedRay};
+use crate::storage::Plain;
+
 /// Which of two sides of a surface a ray may meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Facing {
@@ -34,4 +37,228 @@ pub struct QueryOptions {
     /// A primitive to leave out, such as the one the ray starts on. Of a sphere only the root
     /// nearest to `t = 0` is left out, so that a ray refracted into it still leaves it.
     pub skip: Option<PrimId>,
+}
+
+/// What a query did, for charts and heat maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Boxes of BVH nodes, or cells of a grid, looked at.
+    pub steps: u64,
+    /// Leaf blocks opened.
+    pub blocks: u64,
+    /// Triangles and spheres tested.
+    pub tests: u64,
+}
+
+/// One geometry of the scene: a mesh or a sphere set.
+///
+/// ```text
+/// byte 0            4      8
+///      | first prim | mask |
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Geometry {
+    /// The flat number of its first primitive.
+    pub first: u32,
+    pub mask: u32,
+}
+const _: () = assert!(size_of::<Geometry>() == 8);
+
+// SAFETY: two numbers of equal size.
+#[allow(unsafe_code, reason = "a promise about the layout drawn above")]
+unsafe impl Plain for Geometry {}
+
+/// A primitive that the ray meets within its limits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Candidate {
+    pub t: f64,
+    /// A bound on the error of `t`.
+    pub t_error: f64,
+    /// Weights of the triangle's second and third vertex.
+    pub weights: [f64; 2],
+    /// The flat number of the primitive.
+    pub prim: u32,
+    /// Where it is stored: the number of its leaf block and its lane.
+    pub place: (u32, u32),
+    /// Whether the ray meets the front.
+    pub front: bool,
+    /// Whether skipping the primitive skips this hit: false for the far root of a sphere.
+    pub skippable: bool,
+}
+
+/// The question a traversal answers: it offers candidates and obeys the bound.
+pub(crate) trait Query {
+    /// Nothing beyond this `t` is of interest any more.
+    fn t_bound(&self) -> f64;
+
+    /// Considers a candidate; true ends the traversal. The same candidate may come twice.
+    fn accept(&mut self, candidate: &Candidate) -> bool;
+
+    /// The traversal looked at a box or a cell.
+    fn saw_step(&mut self) {}
+
+    /// The traversal opened a leaf block to test some of its lanes.
+    fn saw_block(&mut self, tests: u32) {
+        let _ = tests;
+    }
+}
+
+/// What a query leaves out, in flat numbers.
+#[derive(Clone, Copy)]
+pub(crate) struct Filter<'m> {
+    geometries: &'m [Geometry],
+    mask: u32,
+    facing: Facing,
+    skip: u32,
+}
+
+impl<'m> Filter<'m> {
+    /// The filter of `options` over a scene with these geometries.
+    pub fn new(options: &QueryOptions, geometries: &'m [Geometry], prim_limit: u32) -> Self {
+        let skip = options.skip.and_then(|id| flat_number(&id, geometries, prim_limit));
+        let QueryOptions { mask, facing, .. } = *options;
+        Filter { geometries, mask, facing, skip: skip.unwrap_or(NONE) }
+    }
+
+    fn lets_pass(&self, candidate: &Candidate) -> bool {
+        let side = match self.facing {
+            Facing::Both => true,
+            Facing::Front => candidate.front,
+            Facing::Back => !candidate.front,
+        };
+        side && !(candidate.skippable && candidate.prim == self.skip)
+            && (self.mask == 0 || self.sees(candidate.prim))
+    }
+
+    fn sees(&self, prim: u32) -> bool {
+        let mask = geometry_of(prim, self.geometries).map_or(0, |(_, g)| g.mask);
+        mask == 0 || mask & self.mask != 0
+    }
+}
+
+/// The number of the geometry that holds the flat number `prim`, and the geometry.
+pub(crate) fn geometry_of(prim: u32, geometries: &[Geometry]) -> Option<(u32, &Geometry)> {
+    // Empty geometries share their first number with the next one; the last of them holds it.
+    let after = geometries.partition_point(|g| g.first <= prim);
+    let number = after.checked_sub(1)?;
+    Some((number as u32, geometries.get(number)?))
+}
+
+/// The flat number of a primitive outside instances, or `None` when it does not exist.
+pub(crate) fn flat_number(id: &PrimId, geometries: &[Geometry], prim_limit: u32) -> Option<u32> {
+    let g = id.geometry as usize;
+    let end = geometries.get(g.checked_add(1)?).map_or(prim_limit, |next| next.first);
+    let prim = geometries.get(g)?.first.checked_add(id.prim)?;
+    (id.instance == NONE && prim < end).then_some(prim)
+}
+
+/// The closest hit: least `t`, and of equal ones the first primitive.
+pub(crate) struct Closest<'m> {
+    filter: Filter<'m>,
+    t_bound: f64,
+    pub best: Option<Candidate>,
+}
+
+impl<'m> Closest<'m> {
+    pub fn new(filter: Filter<'m>, ray: &PreparedRay) -> Self {
+        Closest { filter, t_bound: ray.t_max, best: None }
+    }
+}
+
+impl Query for Closest<'_> {
+    fn t_bound(&self) -> f64 {
+        self.t_bound
+    }
+
+    fn accept(&mut self, candidate: &Candidate) -> bool {
+        let first = self.best.is_none_or(|best| {
+            candidate.t < best.t || (candidate.t == best.t && candidate.prim < best.prim)
+        });
+        if first && self.filter.lets_pass(candidate) {
+            self.best = Some(*candidate);
+            // Boxes are compared with real distances. The margin is the error of this `t`, once
+            // more for the error of the `t` that would have to beat it, and some.
+            let margin = 2.0 * candidate.t_error + candidate.t.abs() * 1e-9;
+            self.t_bound = self.t_bound.min(candidate.t + margin);
+        }
+        false
+    }
+}
+
+/// Whether anything is hit.
+pub(crate) struct Any<'m> {
+    filter: Filter<'m>,
+    t_max: f64,
+    pub hit: bool,
+}
+
+impl<'m> Any<'m> {
+    pub fn new(filter: Filter<'m>, ray: &PreparedRay) -> Self {
+        Any { filter, t_max: ray.t_max, hit: false }
+    }
+}
+
+impl Query for Any<'_> {
+    fn t_bound(&self) -> f64 {
+        self.t_max
+    }
+
+    fn accept(&mut self, candidate: &Candidate) -> bool {
+        self.hit |= self.filter.lets_pass(candidate);
+        self.hit
+    }
+}
+
+/// Finds the one hit with this primitive and this rounded `t` again.
+pub(crate) struct Locate {
+    prim: u32,
+    t: f32,
+    t_max: f64,
+    pub found: Option<Candidate>,
+}
+
+impl Locate {
+    pub fn new(prim: u32, t: f32, ray: &PreparedRay) -> Self {
+        // The real `t` rounds to the given one, so it lies below the next float.
+        Locate { prim, t, t_max: ray.t_max.min(f64::from(t.next_up())), found: None }
+    }
+}
+
+impl Query for Locate {
+    fn t_bound(&self) -> f64 {
+        self.t_max
+    }
+
+    fn accept(&mut self, candidate: &Candidate) -> bool {
+        if candidate.prim == self.prim && candidate.t as f32 == self.t {
+            self.found = Some(*candidate);
+        }
+        self.found.is_some()
+    }
+}
+
+/// Another query, and what the traversal did for it.
+pub(crate) struct Counted<'c, Q> {
+    pub query: Q,
+    pub counts: &'c mut Counts,
+}
+
+impl<Q: Query> Query for Counted<'_, Q> {
+    fn t_bound(&self) -> f64 {
+        self.query.t_bound()
+    }
+
+    fn accept(&mut self, candidate: &Candidate) -> bool {
+        self.query.accept(candidate)
+    }
+
+    fn saw_step(&mut self) {
+        self.counts.steps += 1;
+    }
+
+    fn saw_block(&mut self, tests: u32) {
+        self.counts.blocks += 1;
+        self.counts.tests += u64::from(tests);
+    }
 }

@@ -1,7 +1,5 @@
 //! What a build reads: meshes and sphere sets that stay the caller's.
 
-use crate::error::BuildError;
-
 /// Elements of a few words each, at equal distances in the caller's memory.
 ///
 /// Element `i` is `words[i * stride ..][.. N]`. Words between elements are never read.
@@ -83,6 +81,11 @@ impl<'a> Mesh<'a> {
     /// The same mesh, seen only by queries whose mask shares a bit with `mask`; 0: by all.
     pub fn with_mask(self, mask: u32) -> Self {
         Mesh { mask, ..self }
+    }
+
+    /// Whether triangles name their vertices by number.
+    pub fn is_indexed(&self) -> bool {
+        self.indices.is_some()
     }
 
     /// The number of triangles.

@@ -1,9 +1,60 @@
 //! Axis-aligned boxes.
 
+use glam::DVec3;
+
 /// A closed box; empty when a lower coordinate is above its upper one.
+///
+/// ```text
+/// byte 0       12      24
+///      | lower | upper |
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub(crate) struct Aabb {
     pub lower: [f32; 3],
     pub upper: [f32; 3],
+}
+const _: () = assert!(size_of::<Aabb>() == 24);
+
+impl Aabb {
+    /// The box around nothing: neutral in unions.
+    pub const EMPTY: Aabb = Aabb { lower: [f32::INFINITY; 3], upper: [f32::NEG_INFINITY; 3] };
+
+    /// The smallest box around `points`.
+    pub fn around(points: &[[f32; 3]]) -> Aabb {
+        let mut aabb = Aabb::EMPTY;
+        for p in points {
+            aabb.add(&Aabb { lower: *p, upper: *p });
+        }
+        aabb
+    }
+
+    /// Grows the box until it holds `other`.
+    pub fn add(&mut self, other: &Aabb) {
+        for k in 0..3 {
+            self.lower[k] = self.lower[k].min(other.lower[k]);
+            self.upper[k] = self.upper[k].max(other.upper[k]);
+        }
+    }
+
+    /// Twice the centre, rounded: any point that moves with the box will do for sorting.
+    pub fn centroid2(&self) -> DVec3 {
+        wide(self.lower) + wide(self.upper)
+    }
+
+    /// Lengths of the edges; at most 1e39, so that products stay finite whatever the box.
+    pub fn extent(&self) -> DVec3 {
+        (wide(self.upper) - wide(self.lower)).min(DVec3::splat(1e39)).max(DVec3::ZERO)
+    }
+
+    /// Half the surface area.
+    pub fn half_area(&self) -> f64 {
+        let e = self.extent();
+        e.x * e.y + e.y * e.z + e.z * e.x
+    }
+}
+
+/// Three `f32` as three `f64`: exact.
+pub(crate) fn wide(p: [f32; 3]) -> DVec3 {
+    DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }

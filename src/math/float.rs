@@ -9,11 +9,3 @@ pub(crate) fn sqrt(x: f64) -> f64 {
     #[cfg(not(feature = "std"))]
     return libm::sqrt(x);
 }
-
-/// The largest integer not above `x`.
-pub(crate) fn floor(x: f64) -> f64 {
-    #[cfg(feature = "std")]
-    return std::primitive::f64::floor(x);
-    #[cfg(not(feature = "std"))]
-    return libm::floor(x);
-}

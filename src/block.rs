@@ -1,0 +1,348 @@
+//! The block: what a build leaves in the caller's memory.
+//!
+//! ```text
+//! | header | geometries | prim_ids | grids | nodes | words | sphere blocks | triangle blocks | runs |
+//! ```
+//!
+//! Every part starts at a multiple of 64 bytes and is empty in blocks that have no use for it. There
+//! are no pointers and no stored offsets: the counts in the header say where each part is, so a
+//! block can be copied, written to a file or placed in ROM. The order lets a build finish a part
+//! before it must know the size of the next.
+
+use crate::bvh::BvhNode;
+use crate::error::OpenError;
+use crate::grid::{GridHead, Run};
+use crate::math::Aabb;
+use crate::prim::{SphereBlock, TriangleBlock};
+use crate::query::Geometry;
+use crate::storage::{self, Plain, align_up};
+
+const MAGIC: [u8; 8] = *b"raykern\0";
+const BYTE_ORDER: u32 = 0x0102_0304;
+/// Counted up whenever the bytes of a block change their meaning.
+const VERSION: u32 = 1;
+
+pub(crate) const KIND_LIST: u32 = 1;
+pub(crate) const KIND_GRID: u32 = 2;
+pub(crate) const KIND_BVH: u32 = 3;
+/// The only layout so far: binary nodes of 32 bytes, or a grid's words.
+pub(crate) const LAYOUT_COMPACT: u32 = 1;
+
+/// The number of elements in each part.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub(crate) struct Counts {
+    pub geometries: u32,
+    pub prim_ids: u32,
+    pub grids: u32,
+    pub nodes: u32,
+    pub words: u32,
+    pub sphere_blocks: u32,
+    pub triangle_blocks: u32,
+    pub runs: u32,
+}
+
+/// The first 128 bytes.
+///
+/// ```text
+/// byte 0        8            12        16     24     28       32      56
+///      | magic | byte order | version | size | kind | layout | bounds | ...
+/// byte 56           60                64          68
+///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reserved |
+/// byte 88       120        128
+///      | counts | reserved |
+/// ```
+///
+/// Flat primitive numbers run through the meshes and then through the sphere sets: below
+/// `triangle_limit` they are triangles, from there to `prim_limit` spheres.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Header {
+    magic: [u8; 8],
+    byte_order: u32,
+    version: u32,
+    pub size: u64,
+    pub kind: u32,
+    pub layout: u32,
+    pub bounds: Aabb,
+    pub mesh_count: u32,
+    pub triangle_limit: u32,
+    pub prim_limit: u32,
+    pub triangle_count: u32,
+    pub sphere_count: u32,
+    pub ignored_count: u32,
+    reserved: [u32; 2],
+    pub counts: Counts,
+    reserved_too: [u32; 2],
+}
+const _: () = assert!(size_of::<Header>() == 128);
+
+// SAFETY: numbers only; 8 + 4 + 4 + 8 + 4 + 4 + 24 + 24 + 8 + 32 + 8 = 128, so no padding.
+#[allow(unsafe_code, reason = "a promise about the layout drawn above")]
+unsafe impl Plain for Header {}
+
+/// Where each part starts, in bytes; the last entry is the size of the block.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Offsets {
+    pub geometries: usize,
+    pub prim_ids: usize,
+    pub grids: usize,
+    pub nodes: usize,
+    pub words: usize,
+    pub sphere_blocks: usize,
+    pub triangle_blocks: usize,
+    pub runs: usize,
+    pub end: usize,
+}
+
+impl Counts {
+    /// Where parts of these sizes lie; `None` when the machine cannot address the end.
+    pub fn offsets(&self) -> Option<Offsets> {
+        let mut end = size_of::<Header>() as u64;
+        // Both the start of the part and the start of what follows must be a `usize`.
+        let mut part = |count: u32, size: usize| -> Option<usize> {
+            let start = end;
+            end = align_up(start.checked_add(u64::from(count).checked_mul(size as u64)?)?)?;
+            isize::try_from(end).ok()?;
+            usize::try_from(start).ok()
+        };
+        let offsets = Offsets {
+            geometries: part(self.geometries, size_of::<Geometry>())?,
+            prim_ids: part(self.prim_ids, size_of::<u32>())?,
+            grids: part(self.grids, size_of::<GridHead>())?,
+            nodes: part(self.nodes, size_of::<BvhNode>())?,
+            words: part(self.words, size_of::<u32>())?,
+            sphere_blocks: part(self.sphere_blocks, size_of::<SphereBlock>())?,
+            triangle_blocks: part(self.triangle_blocks, size_of::<TriangleBlock>())?,
+            runs: part(self.runs, size_of::<Run>())?,
+            end: 0,
+        };
+        Some(Offsets { end: usize::try_from(end).ok()?, ..offsets })
+    }
+}
+
+/// The parts of a block that is being built.
+pub(crate) struct PartsMut<'b> {
+    pub geometries: &'b mut [Geometry],
+    pub prim_ids: &'b mut [u32],
+    pub grids: &'b mut [GridHead],
+    pub nodes: &'b mut [BvhNode],
+    pub words: &'b mut [u32],
+    pub sphere_blocks: &'b mut [SphereBlock],
+    pub triangle_blocks: &'b mut [TriangleBlock],
+    pub runs: &'b mut [Run],
+    /// What lies behind the last part.
+    pub rest: &'b mut [u8],
+}
+
+impl Counts {
+    /// Parts of these sizes in `bytes`, with whatever stands there; `None` when they do not fit.
+    pub fn parts_mut<'b>(&self, bytes: &'b mut [u8]) -> Option<PartsMut<'b>> {
+        let at = self.offsets()?;
+        let (_, rest) = bytes.split_at_mut_checked(at.geometries)?;
+        let (geometries, rest) = part(rest, self.geometries, at.prim_ids - at.geometries)?;
+        let (prim_ids, rest) = part(rest, self.prim_ids, at.grids - at.prim_ids)?;
+        let (grids, rest) = part(rest, self.grids, at.nodes - at.grids)?;
+        let (nodes, rest) = part(rest, self.nodes, at.words - at.nodes)?;
+        let (words, rest) = part(rest, self.words, at.sphere_blocks - at.words)?;
+        let spheres = at.triangle_blocks - at.sphere_blocks;
+        let (sphere_blocks, rest) = part(rest, self.sphere_blocks, spheres)?;
+        let triangles = at.runs - at.triangle_blocks;
+        let (triangle_blocks, rest) = part(rest, self.triangle_blocks, triangles)?;
+        let (runs, rest) = part(rest, self.runs, at.end - at.runs)?;
+        Some(PartsMut {
+            geometries,
+            prim_ids,
+            grids,
+            nodes,
+            words,
+            sphere_blocks,
+            triangle_blocks,
+            runs,
+            rest,
+        })
+    }
+
+    /// Finishes a block whose parts are in place: zeros between them, and the header. Returns its
+    /// size.
+    pub fn seal(&self, kind: u32, census: &Census, bytes: &mut [u8]) -> Option<usize> {
+        let at = self.offsets()?;
+        let parts = [
+            (at.geometries, self.geometries as usize * size_of::<Geometry>()),
+            (at.prim_ids, self.prim_ids as usize * size_of::<u32>()),
+            (at.grids, self.grids as usize * size_of::<GridHead>()),
+            (at.nodes, self.nodes as usize * size_of::<BvhNode>()),
+            (at.words, self.words as usize * size_of::<u32>()),
+            (at.sphere_blocks, self.sphere_blocks as usize * size_of::<SphereBlock>()),
+            (at.triangle_blocks, self.triangle_blocks as usize * size_of::<TriangleBlock>()),
+            (at.runs, self.runs as usize * size_of::<Run>()),
+        ];
+        for (start, size) in parts {
+            let end = start + size;
+            let next = storage::align_up(end as u64)? as usize;
+            bytes.get_mut(end..next)?.fill(0);
+        }
+        let header = Header::new(kind, census, *self, at.end);
+        bytes.get_mut(..size_of::<Header>())?.copy_from_slice(storage::bytes_of(&header));
+        Some(at.end)
+    }
+}
+
+/// `count` elements at the front of `bytes`, and what follows after `size` bytes.
+fn part<T: Plain>(bytes: &mut [u8], count: u32, size: usize) -> Option<(&mut [T], &mut [u8])> {
+    let (part, rest) = bytes.split_at_mut_checked(size)?;
+    Some((storage::view_mut(part, 0, count as usize)?, rest))
+}
+
+/// What the header says of the scene, apart from sizes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Census {
+    pub bounds: Aabb,
+    pub mesh_count: u32,
+    pub triangle_limit: u32,
+    pub prim_limit: u32,
+    pub triangle_count: u32,
+    pub sphere_count: u32,
+    pub ignored_count: u32,
+}
+
+impl Header {
+    /// The header of a finished block.
+    pub fn new(kind: u32, census: &Census, counts: Counts, size: usize) -> Header {
+        Header {
+            magic: MAGIC,
+            byte_order: BYTE_ORDER,
+            version: VERSION,
+            size: size as u64,
+            kind,
+            layout: LAYOUT_COMPACT,
+            bounds: census.bounds,
+            mesh_count: census.mesh_count,
+            triangle_limit: census.triangle_limit,
+            prim_limit: census.prim_limit,
+            triangle_count: census.triangle_count,
+            sphere_count: census.sphere_count,
+            ignored_count: census.ignored_count,
+            reserved: [0; 2],
+            counts,
+            reserved_too: [0; 2],
+        }
+    }
+}
+
+/// A block as typed slices.
+#[derive(Clone, Copy)]
+pub(crate) struct Block<'m> {
+    pub bytes: &'m [u8],
+    pub header: &'m Header,
+    pub geometries: &'m [Geometry],
+    pub prim_ids: &'m [u32],
+    pub grids: &'m [GridHead],
+    pub nodes: &'m [BvhNode],
+    pub words: &'m [u32],
+    pub sphere_blocks: &'m [SphereBlock],
+    pub triangle_blocks: &'m [TriangleBlock],
+    pub runs: &'m [Run],
+}
+
+impl<'m> Block<'m> {
+    /// The size that the block at `block` has according to its header.
+    ///
+    /// # Safety
+    ///
+    /// `block` points to a header, aligned as one.
+    #[cfg(feature = "capi")]
+    #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
+    pub unsafe fn size_at(block: *const u8) -> usize {
+        // SAFETY: the caller's promise.
+        let header = unsafe { &*block.cast::<Header>() };
+        header.size as usize
+    }
+
+    /// The parts of a block whose header is right. `bytes` may be longer than the block; what the
+    /// parts hold is not looked at.
+    ///
+    /// Checked are: alignment, magic, byte order, version, layout, and that the counts give just
+    /// the size that the header names, which is no more than there is.
+    pub fn split(bytes: &'m [u8]) -> Result<Self, OpenError> {
+        if !bytes.as_ptr().cast::<Header>().is_aligned() {
+            return Err(OpenError::Misaligned);
+        }
+        let Some(header) = storage::view::<Header>(bytes, 0, 1).and_then(<[_]>::first) else {
+            let begins_right = MAGIC.starts_with(bytes.get(..8).unwrap_or(bytes));
+            return Err(if begins_right { OpenError::Truncated } else { OpenError::NotABlock });
+        };
+        if header.magic != MAGIC {
+            return Err(OpenError::NotABlock);
+        }
+        if header.byte_order == BYTE_ORDER.swap_bytes() {
+            return Err(OpenError::ByteOrder);
+        }
+        if header.byte_order != BYTE_ORDER {
+            return Err(OpenError::Corrupt);
+        }
+        if header.version != VERSION {
+            return Err(OpenError::Version);
+        }
+        if header.layout != LAYOUT_COMPACT {
+            return Err(OpenError::Layout);
+        }
+        let offsets = header.counts.offsets().ok_or(OpenError::Corrupt)?;
+        if header.size != offsets.end as u64 {
+            return Err(OpenError::Corrupt);
+        }
+        let bytes = bytes.get(..offsets.end).ok_or(OpenError::Truncated)?;
+        Self::parts(bytes, header, &offsets).ok_or(OpenError::Corrupt)
+    }
+
+    fn parts(bytes: &'m [u8], header: &'m Header, at: &Offsets) -> Option<Self> {
+        let counts = &header.counts;
+        let view_u32 = |offset, count: u32| storage::view::<u32>(bytes, offset, count as usize);
+        Some(Block {
+            bytes,
+            header,
+            geometries: storage::view(bytes, at.geometries, counts.geometries as usize)?,
+            prim_ids: view_u32(at.prim_ids, counts.prim_ids)?,
+            grids: storage::view(bytes, at.grids, counts.grids as usize)?,
+            nodes: storage::view(bytes, at.nodes, counts.nodes as usize)?,
+            words: view_u32(at.words, counts.words)?,
+            sphere_blocks: storage::view(bytes, at.sphere_blocks, counts.sphere_blocks as usize)?,
+            triangle_blocks: storage::view(
+                bytes,
+                at.triangle_blocks,
+                counts.triangle_blocks as usize,
+            )?,
+            runs: storage::view(bytes, at.runs, counts.runs as usize)?,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_follow_each_other_on_cache_lines() {
+        let counts = Counts { geometries: 3, prim_ids: 17, nodes: 2, ..Counts::default() };
+        let at = counts.offsets().unwrap();
+        assert_eq!((at.geometries, at.prim_ids, at.grids), (128, 192, 320));
+        assert_eq!((at.nodes, at.words, at.end), (320, 384, 384));
+    }
+
+    #[test]
+    fn no_counts_overflow() {
+        let most = u32::MAX;
+        let counts = Counts {
+            geometries: most,
+            prim_ids: most,
+            grids: most,
+            nodes: most,
+            words: most,
+            sphere_blocks: most,
+            triangle_blocks: most,
+            runs: most,
+        };
+        // Two terabytes: addressable with 64 bits, refused with 32.
+        assert_eq!(counts.offsets().is_some(), usize::BITS == 64);
+    }
+}

@@ -1,0 +1,139 @@
+//! From a scene to a finished BVH in the caller's memory.
+
+use super::tree::{Grown, PrimRef, grow, leaf_budget};
+use super::{BvhNode, MAX_DEPTH};
+use crate::block::{Census, Counts, KIND_BVH, PartsMut};
+use crate::error::BuildError;
+use crate::prim::{
+    Packer, SPHERES, Shape, Survey, TRIANGLES_AT_LEAST, for_each_prim, geometries, shape,
+};
+use crate::scene::Scene;
+use crate::storage;
+
+/// The sizes of the parts, with room for the most that they may need.
+///
+/// While the tree grows, the refs lie behind the nodes; when it is done, their ids move to the front
+/// and the leaf blocks take their place. So the memory is that of the larger of the two.
+struct Plan {
+    leaves: usize,
+    growing: Counts,
+    packing: Counts,
+    ref_count: usize,
+    size: usize,
+}
+
+impl Plan {
+    /// The plan for the tree that SAH wants (`full`), or for the least that works.
+    fn new(survey: &Survey, census: &Census, full: bool) -> Result<Plan, BuildError> {
+        let (triangles, spheres) = (census.triangle_count, census.sphere_count);
+        let prims = census.hittable();
+        let mixed = triangles > 0 && spheres > 0;
+        let leaves = leaf_budget(prims as usize, mixed, full);
+        let growing = Counts {
+            geometries: survey.geometry_count,
+            prim_ids: prims,
+            nodes: 2 * leaves as u32,
+            ..Counts::default()
+        };
+        let packing = Counts {
+            sphere_blocks: spheres.div_ceil(SPHERES as u32),
+            triangle_blocks: triangles.div_ceil(TRIANGLES_AT_LEAST as u32),
+            ..growing
+        };
+        let refs = (prims as usize).checked_mul(size_of::<PrimRef>());
+        let grown = growing.offsets().and_then(|at| at.end.checked_add(refs?));
+        let packed = packing.offsets().map(|at| at.end);
+        let size = grown.zip(packed).and_then(|(a, b)| storage::align_up(a.max(b) as u64));
+        let size = size.and_then(|size| usize::try_from(size).ok()).ok_or(BuildError::TooLarge)?;
+        Ok(Plan { leaves, growing, packing, ref_count: prims as usize, size })
+    }
+}
+
+/// The bytes for the tree that SAH wants, and the bytes below which there is none.
+pub(crate) fn needs(survey: &Survey, census: &Census) -> Result<(usize, usize), BuildError> {
+    Ok((Plan::new(survey, census, true)?.size, Plan::new(survey, census, false)?.size))
+}
+
+/// Builds into `bytes`, which are zero and at least the minimum of [`needs`]; returns the size of
+/// the finished block. At least one primitive can be hit.
+pub(crate) fn build(
+    scene: &Scene,
+    survey: &Survey,
+    census: &Census,
+    bytes: &mut [u8],
+) -> Result<usize, BuildError> {
+    let full = Plan::new(survey, census, true)?;
+    let fits = full.size <= bytes.len();
+    let plan = if fits { full } else { Plan::new(survey, census, false)? };
+    let short = BuildError::OutOfMemory { minimum: plan.size };
+    let node_count = grow_tree(scene, census, &plan, bytes).ok_or(short)?;
+    let counts = Counts { nodes: node_count as u32, ..plan.packing };
+    let triangle_blocks = pack_leaves(scene, census, &counts, bytes).ok_or(short)?;
+    let counts = Counts { triangle_blocks: triangle_blocks as u32, ..counts };
+    counts.seal(KIND_BVH, census, bytes).ok_or(short)
+}
+
+/// Grows the tree and writes geometries and ids; returns the number of nodes.
+fn grow_tree(scene: &Scene, census: &Census, plan: &Plan, bytes: &mut [u8]) -> Option<usize> {
+    let PartsMut { geometries: table, prim_ids, nodes, rest, .. } =
+        plan.growing.parts_mut(bytes)?;
+    geometries(scene, table);
+    let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
+    let mut free = refs.iter_mut();
+    for_each_prim(scene, |prim| {
+        if let Some(r) = free.next() {
+            let sphere = matches!(prim.shape, Shape::Sphere { .. });
+            *r = PrimRef::new(prim.id, &prim.shape.aabb(), sphere);
+        }
+    });
+    let mixed = census.triangle_count > 0 && census.sphere_count > 0;
+    let node_count = grow(nodes, refs, plan.leaves, mixed)?;
+    // Triangles first, then spheres, each in the order of the leaves.
+    let kinds = [0, 1].into_iter().flat_map(|kind| refs.iter().filter(move |r| r.sphere == kind));
+    for (id, r) in prim_ids.iter_mut().zip(kinds) {
+        *id = r.id;
+    }
+    Some(node_count)
+}
+
+/// Packs the leaves, in the order in which a depth-first walk meets them, and points the nodes at
+/// their lanes; returns the number of triangle blocks.
+fn pack_leaves(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Option<usize> {
+    let PartsMut { geometries, prim_ids, nodes, sphere_blocks, triangle_blocks, .. } =
+        counts.parts_mut(bytes)?;
+    let (triangles, spheres) = prim_ids.split_at(census.triangle_count as usize);
+    let (mut triangles, mut spheres) = (triangles.iter(), spheres.iter());
+    let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    for_each_leaf(nodes, |node| {
+        let (count, is_sphere) = Grown::of(node);
+        let ids = if is_sphere { &mut spheres } else { &mut triangles };
+        let shapes = ids.take(count).filter_map(|id| shape(scene, geometries, *id));
+        let leaf = packer.push_leaf(shapes)?;
+        node.first = leaf.block;
+        node.lanes = leaf.lanes;
+        Some(())
+    })?;
+    Some(packer.triangle_block_count())
+}
+
+/// Calls `f` with each leaf, left before right.
+fn for_each_leaf(
+    nodes: &mut [BvhNode],
+    mut f: impl FnMut(&mut BvhNode) -> Option<()>,
+) -> Option<()> {
+    let mut stack = [0u32; MAX_DEPTH];
+    let mut pending = 1;
+    while pending > 0 {
+        pending -= 1;
+        let node = nodes.get_mut(stack[pending] as usize)?;
+        if node.is_leaf() {
+            f(node)?;
+            continue;
+        }
+        let pair = node.first;
+        *stack.get_mut(pending)? = pair + 1;
+        *stack.get_mut(pending + 1)? = pair;
+        pending += 2;
+    }
+    Some(())
+}

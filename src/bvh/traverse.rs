@@ -1,0 +1,92 @@
+//! The one loop over the tree.
+
+use super::{BvhNode, MAX_DEPTH};
+use crate::prim::Leaves;
+use crate::query::Query;
+use crate::ray::PreparedRay;
+
+/// Offers `query` everything the ray meets, near nodes first; true when it ended the search.
+///
+/// The stack holds at most one sibling a level, so it cannot overflow on a tree that is no deeper
+/// than [`MAX_DEPTH`]; deeper ones are refused when a block is opened.
+pub(crate) fn traverse<Q: Query>(
+    nodes: &[BvhNode],
+    leaves: &Leaves,
+    ray: &PreparedRay,
+    query: &mut Q,
+) -> bool {
+    let mut stack = Stack { entries: [(0, 0.0); MAX_DEPTH], count: 0 };
+    let Some(mut node) = nodes.first() else { return false };
+    query.saw_step();
+    if ray.slab(&node.aabb(), query.t_bound()).is_empty() {
+        return false;
+    }
+    loop {
+        if node.is_leaf() {
+            if leaves.intersect(node.leaf(), ray, query) {
+                return true;
+            }
+        } else if let Some(child) = nearer_child(nodes, node.first, ray, query, &mut stack) {
+            node = child;
+            continue;
+        }
+        let Some(next) = stack.pop(query.t_bound()).and_then(|i| nodes.get(i as usize)) else {
+            return false;
+        };
+        node = next;
+    }
+}
+
+/// The nearer of two children that the ray meets; the other one goes on the stack.
+fn nearer_child<'n, Q: Query>(
+    nodes: &'n [BvhNode],
+    first: u32,
+    ray: &PreparedRay,
+    query: &mut Q,
+    stack: &mut Stack,
+) -> Option<&'n BvhNode> {
+    let [left, right] = nodes.get(first as usize..)?.first_chunk::<2>()?;
+    query.saw_step();
+    query.saw_step();
+    let t_bound = query.t_bound();
+    let (a, b) = (ray.slab(&left.aabb(), t_bound), ray.slab(&right.aabb(), t_bound));
+    match (a.is_empty(), b.is_empty()) {
+        (true, true) => None,
+        (false, true) => Some(left),
+        (true, false) => Some(right),
+        (false, false) if a.near <= b.near => {
+            stack.push(first + 1, b.near);
+            Some(left)
+        }
+        (false, false) => {
+            stack.push(first, a.near);
+            Some(right)
+        }
+    }
+}
+
+/// Nodes to come back to, each with the `t` at which the ray enters it.
+struct Stack {
+    entries: [(u32, f64); MAX_DEPTH],
+    count: usize,
+}
+
+impl Stack {
+    fn push(&mut self, node: u32, near: f64) {
+        if let Some(entry) = self.entries.get_mut(self.count) {
+            *entry = (node, near);
+            self.count += 1;
+        }
+    }
+
+    /// The last node pushed that the ray enters before `t_bound`.
+    fn pop(&mut self, t_bound: f64) -> Option<u32> {
+        while let Some((node, near)) = self.entries[..self.count].last().copied() {
+            self.count -= 1;
+            if near <= t_bound {
+                return Some(node);
+            }
+        }
+        None
+    }
+}

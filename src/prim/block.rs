@@ -1,0 +1,187 @@
+//! Leaf blocks: the primitives as every structure stores them.
+
+#![allow(unsafe_code, reason = "promises about the layouts drawn here")]
+
+use crate::math::Aabb;
+use crate::storage::Plain;
+
+/// Triangles in a [`TriangleBlock`] at most, and vertices too.
+pub(crate) const TRIANGLES: usize = 16;
+/// Triangles of which none share a vertex always fit into one block: `5 * 3 <= 16`.
+pub(crate) const TRIANGLES_AT_LEAST: usize = 5;
+/// Spheres in a [`SphereBlock`] at most.
+pub(crate) const SPHERES: usize = 15;
+
+/// Up to 16 triangles over up to 16 shared vertices.
+///
+/// ```text
+/// byte 0        64       128      192       216     220     224   248        256
+///      | x[16] | y[16] | z[16] | corners | first | count | aabb | reserved |
+/// ```
+///
+/// `corners[k]` holds the number of vertex `k` of triangle `i` in its nibble `i`, the lower nibble of
+/// a byte first. Triangle `i < count` is primitive `prim_ids[first + i]`. `aabb` holds them all.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(crate) struct TriangleBlock {
+    pub x: [f32; TRIANGLES],
+    pub y: [f32; TRIANGLES],
+    pub z: [f32; TRIANGLES],
+    pub corners: [[u8; TRIANGLES / 2]; 3],
+    pub first: u32,
+    pub count: u32,
+    pub aabb: Aabb,
+    pub reserved: [u32; 2],
+}
+const _: () = assert!(size_of::<TriangleBlock>() == 256);
+
+// SAFETY: numbers only; 3 * 64 + 24 + 8 + 24 + 8 = 256, so no padding.
+unsafe impl Plain for TriangleBlock {}
+
+impl TriangleBlock {
+    pub const EMPTY: Self = TriangleBlock {
+        x: [0.0; TRIANGLES],
+        y: [0.0; TRIANGLES],
+        z: [0.0; TRIANGLES],
+        corners: [[0; TRIANGLES / 2]; 3],
+        first: 0,
+        count: 0,
+        aabb: Aabb::EMPTY,
+        reserved: [0; 2],
+    };
+
+    /// The vertices of triangle `i < 16`, whatever the block holds.
+    pub fn triangle(&self, i: usize) -> [[f32; 3]; 3] {
+        let i = i % TRIANGLES;
+        self.corners.map(|list| {
+            // A nibble is below 16, so no index here can be out of range.
+            let v = usize::from(list[i / 2] >> (4 * (i % 2)) & 15);
+            [self.x[v], self.y[v], self.z[v]]
+        })
+    }
+
+    /// The lanes in use, one bit each.
+    pub fn lanes(&self) -> u32 {
+        low_bits(self.count.min(TRIANGLES as u32))
+    }
+
+    /// Writes vertex number `v` for corner `k` of triangle `i`.
+    pub fn set_corner(&mut self, i: usize, k: usize, v: usize) {
+        let byte = &mut self.corners[k][i / 2];
+        let shift = 4 * (i % 2);
+        *byte = (*byte & !(15 << shift)) | ((v as u8 & 15) << shift);
+    }
+}
+
+/// Up to 15 spheres.
+///
+/// ```text
+/// byte 0        60       120      180           240     244     248        256
+///      | x[15] | y[15] | z[15] | radius[15] | first | count | reserved |
+/// ```
+///
+/// Sphere `i < count` is primitive `prim_ids[first + i]`.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub(crate) struct SphereBlock {
+    pub x: [f32; SPHERES],
+    pub y: [f32; SPHERES],
+    pub z: [f32; SPHERES],
+    pub radius: [f32; SPHERES],
+    pub first: u32,
+    pub count: u32,
+    pub reserved: [u32; 2],
+}
+const _: () = assert!(size_of::<SphereBlock>() == 256);
+
+// SAFETY: numbers only; 4 * 60 + 4 + 4 + 8 = 256, so no padding.
+unsafe impl Plain for SphereBlock {}
+
+impl SphereBlock {
+    pub const EMPTY: Self = SphereBlock {
+        x: [0.0; SPHERES],
+        y: [0.0; SPHERES],
+        z: [0.0; SPHERES],
+        radius: [0.0; SPHERES],
+        first: 0,
+        count: 0,
+        reserved: [0; 2],
+    };
+
+    /// Centre and radius of sphere `i < 15`, whatever the block holds.
+    pub fn sphere(&self, i: usize) -> ([f32; 3], f32) {
+        let i = i % SPHERES;
+        ([self.x[i], self.y[i], self.z[i]], self.radius[i])
+    }
+
+    /// The lanes in use, one bit each.
+    pub fn lanes(&self) -> u32 {
+        low_bits(self.count.min(SPHERES as u32))
+    }
+}
+
+/// `n <= 16` ones.
+pub(crate) fn low_bits(n: u32) -> u32 {
+    (1 << n.min(16)) - 1
+}
+
+/// Which lanes of which leaf block: what a leaf of a BVH and an entry of a grid cell refer to.
+///
+/// `block` holds the kind in its two highest bits and the block's number below. Lanes 0..16 are
+/// those of that block, lanes 16..32 those of the block after it: a BVH leaf may straddle two, so
+/// blocks are always filled to the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LeafRef {
+    pub block: u32,
+    pub lanes: u32,
+}
+
+/// The kinds of leaf blocks.
+pub(crate) const KIND_TRIANGLES: u32 = 1;
+pub(crate) const KIND_SPHERES: u32 = 2;
+/// Block numbers lie below the bits of the kind.
+pub(crate) const BLOCK_BITS: u32 = 30;
+
+/// A block's kind and number in one word.
+pub(crate) const fn block_ref(kind: u32, number: u32) -> u32 {
+    kind << BLOCK_BITS | number
+}
+
+impl LeafRef {
+    pub fn kind(self) -> u32 {
+        self.block >> BLOCK_BITS
+    }
+
+    pub fn number(self) -> usize {
+        (self.block & ((1 << BLOCK_BITS) - 1)) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_are_nibbles() {
+        let mut block = TriangleBlock::EMPTY;
+        for v in 0..16 {
+            block.x[v] = v as f32;
+        }
+        for i in 0..16 {
+            for k in 0..3 {
+                block.set_corner(i, k, (i * 5 + k) % 16);
+            }
+        }
+        for i in 0..16 {
+            let x = block.triangle(i).map(|vertex| vertex[0]);
+            assert_eq!(x, [0, 1, 2].map(|k| ((i * 5 + k) % 16) as f32));
+        }
+    }
+
+    #[test]
+    fn a_reference_keeps_kind_and_number() {
+        let leaf = LeafRef { block: block_ref(KIND_SPHERES, 1_000_000), lanes: 5 };
+        assert_eq!((leaf.kind(), leaf.number()), (KIND_SPHERES, 1_000_000));
+        assert_eq!((low_bits(0), low_bits(3), low_bits(16)), (0, 7, 0xFFFF));
+    }
+}

@@ -1,0 +1,173 @@
+//! Fills leaf blocks, each to the end before the next.
+
+use super::block::{
+    KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock,
+    block_ref,
+};
+use super::gather::Shape;
+use crate::math::Aabb;
+
+/// Primitives go in one by one and come to lie in blocks, in the order of their coming.
+///
+/// Triangles of one block share vertices of equal bits. A block is closed when the next triangle
+/// would need a seventeenth vertex or lane, so every block but the last holds at least five.
+pub(crate) struct Packer<'b> {
+    triangle_blocks: &'b mut [TriangleBlock],
+    sphere_blocks: &'b mut [SphereBlock],
+    triangles: Fill,
+    spheres: Fill,
+}
+
+/// How far blocks of one kind are filled.
+#[derive(Clone, Copy, Default)]
+struct Fill {
+    /// Blocks in use; the last of them is the one being filled.
+    blocks: usize,
+    /// Vertices in that block.
+    vertices: usize,
+    /// The entry of `prim_ids` that the next primitive gets.
+    next_id: u32,
+}
+
+impl<'b> Packer<'b> {
+    /// Packs into these blocks. The ids of triangles start at entry 0 of `prim_ids`, those of
+    /// spheres at entry `first_sphere`.
+    pub fn new(
+        triangle_blocks: &'b mut [TriangleBlock],
+        sphere_blocks: &'b mut [SphereBlock],
+        first_sphere: u32,
+    ) -> Self {
+        let spheres = Fill { next_id: first_sphere, ..Fill::default() };
+        Packer { triangle_blocks, sphere_blocks, triangles: Fill::default(), spheres }
+    }
+
+    /// The number of triangle blocks in use.
+    pub fn triangle_block_count(&self) -> usize {
+        self.triangles.blocks
+    }
+
+    /// Adds a primitive; returns the block it went to, as [`LeafRef::block`] has it, and its lane.
+    /// `None` when the blocks are full, which the sizes that `needs` plans exclude.
+    pub fn push(&mut self, shape: &Shape) -> Option<(u32, u32)> {
+        match *shape {
+            Shape::Triangle(corners) => self.push_triangle(corners),
+            Shape::Sphere { centre, radius } => self.push_sphere(centre, radius),
+        }
+    }
+
+    /// Adds primitives of one kind, six at the most, as one leaf.
+    pub fn push_leaf(&mut self, shapes: impl Iterator<Item = Shape>) -> Option<LeafRef> {
+        let mut leaf: Option<LeafRef> = None;
+        for shape in shapes {
+            let (block, lane) = self.push(&shape)?;
+            let leaf = leaf.get_or_insert(LeafRef { block, lanes: 0 });
+            // At most one step to the next block: five triangles always fit into it.
+            leaf.lanes |= 1 << (lane + 16 * (block - leaf.block));
+        }
+        leaf
+    }
+
+    fn push_triangle(&mut self, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
+        let fill = &mut self.triangles;
+        let open = fill.blocks.checked_sub(1).and_then(|b| self.triangle_blocks.get(b));
+        let fits = open.is_some_and(|block| {
+            (block.count as usize) < TRIANGLES
+                && fill.vertices + missing(block, fill.vertices, &corners) <= TRIANGLES
+        });
+        if !fits {
+            *self.triangle_blocks.get_mut(fill.blocks)? =
+                TriangleBlock { first: fill.next_id, ..TriangleBlock::EMPTY };
+            fill.blocks += 1;
+            fill.vertices = 0;
+        }
+        let number = fill.blocks - 1;
+        let block = self.triangle_blocks.get_mut(number)?;
+        let lane = block.count;
+        for (k, corner) in corners.iter().enumerate() {
+            let v = find(block, fill.vertices, corner).unwrap_or_else(|| {
+                let v = fill.vertices;
+                [block.x[v], block.y[v], block.z[v]] = *corner;
+                fill.vertices += 1;
+                v
+            });
+            block.set_corner(lane as usize, k, v);
+        }
+        block.aabb.add(&Aabb::around(&corners));
+        block.count += 1;
+        fill.next_id += 1;
+        Some((block_ref(KIND_TRIANGLES, number as u32), lane))
+    }
+
+    fn push_sphere(&mut self, [x, y, z]: [f32; 3], radius: f32) -> Option<(u32, u32)> {
+        let fill = &mut self.spheres;
+        let open = fill.blocks.checked_sub(1).and_then(|b| self.sphere_blocks.get(b));
+        if open.is_none_or(|block| block.count as usize == SPHERES) {
+            *self.sphere_blocks.get_mut(fill.blocks)? =
+                SphereBlock { first: fill.next_id, ..SphereBlock::EMPTY };
+            fill.blocks += 1;
+        }
+        let number = fill.blocks - 1;
+        let block = self.sphere_blocks.get_mut(number)?;
+        let lane = block.count as usize;
+        (block.x[lane], block.y[lane], block.z[lane], block.radius[lane]) = (x, y, z, radius);
+        block.count += 1;
+        fill.next_id += 1;
+        Some((block_ref(KIND_SPHERES, number as u32), lane as u32))
+    }
+}
+
+/// The vertex with just these bits among the first `count`.
+fn find(block: &TriangleBlock, count: usize, corner: &[f32; 3]) -> Option<usize> {
+    let [x, y, z] = corner.map(f32::to_bits);
+    (0..count).find(|&v| {
+        block.x[v].to_bits() == x && block.y[v].to_bits() == y && block.z[v].to_bits() == z
+    })
+}
+
+/// How many vertices of the triangle the block does not have yet, at most.
+fn missing(block: &TriangleBlock, count: usize, corners: &[[f32; 3]; 3]) -> usize {
+    corners.iter().filter(|corner| find(block, count, corner).is_none()).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn triangle(x: f32) -> Shape {
+        Shape::Triangle([[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]])
+    }
+
+    #[test]
+    fn blocks_of_separate_triangles_hold_five() {
+        let mut blocks = [TriangleBlock::EMPTY; 4];
+        let mut packer = Packer::new(&mut blocks, &mut [], 0);
+        let places: [_; 16] = core::array::from_fn(|i| packer.push(&triangle(3.0 * i as f32)));
+        assert!(places.iter().all(Option::is_some));
+        assert_eq!(packer.triangle_block_count(), 4);
+        assert_eq!(blocks.map(|b| b.count), [5, 5, 5, 1]);
+        assert_eq!(blocks.map(|b| b.first), [0, 5, 10, 15]);
+        assert_eq!(blocks[1].triangle(2)[1], [22.0, 0.0, 0.0]);
+        assert_eq!((blocks[1].aabb.lower, blocks[1].aabb.upper), ([15., 0., 0.], [28., 1., 0.]));
+    }
+
+    #[test]
+    fn shared_vertices_are_stored_once() {
+        let mut blocks = [TriangleBlock::EMPTY; 1];
+        let mut packer = Packer::new(&mut blocks, &mut [], 0);
+        for _ in 0..16 {
+            assert!(packer.push(&triangle(0.0)).is_some());
+        }
+        assert!(packer.push(&triangle(0.0)).is_none(), "a seventeenth lane does not exist");
+    }
+
+    #[test]
+    fn a_leaf_may_straddle_two_blocks() {
+        let mut blocks = [TriangleBlock::EMPTY; 2];
+        let mut packer = Packer::new(&mut blocks, &mut [], 0);
+        let leaf = |n: usize| (0..n).map(move |i| triangle(3.0 * (i + 10 * n) as f32));
+        let first = packer.push_leaf(leaf(3)).expect("room");
+        let second = packer.push_leaf(leaf(6)).expect("room");
+        assert_eq!((first.number(), first.lanes), (0, 0b111));
+        assert_eq!((second.number(), second.lanes), (0, 0b1111 << 16 | 0b11000));
+    }
+}

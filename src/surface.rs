@@ -1,0 +1,65 @@
+//! What is known of a surface where a ray met it.
+
+use glam::DVec3;
+
+use crate::math::rounding::{UNIT, f32_above, f32_below};
+use crate::math::wide;
+use crate::prim;
+use crate::ray::PreparedRay;
+
+/// The surface at a hit, in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// The point of the hit, rounded.
+    pub position: [f32; 3],
+    /// Bound on the distance of `position` from the surface, along each axis.
+    pub position_error: f32,
+    /// Unit normal: `(v1 - v0) x (v2 - v0)`, or outward on spheres; never flipped to the ray.
+    pub normal: [f32; 3],
+    /// `position` moved off the surface to the side of the normal.
+    pub front_origin: [f32; 3],
+    /// `position` moved off the surface to the other side.
+    pub back_origin: [f32; 3],
+}
+
+/// The surface of a triangle at the point with these weights of the second and third vertex.
+pub(crate) fn of_triangle(triangle: [[f32; 3]; 3], [u, v]: [f64; 2]) -> Surface {
+    let [a, b, c] = triangle.map(wide);
+    // Whatever the error of the weights, the point lies in the plane.
+    let point = a + u * (b - a) + v * (c - a);
+    let size = a.abs().max(b.abs()).max(c.abs()).max_element();
+    at(point, size, prim::normal(triangle))
+}
+
+/// The surface of a sphere at `t` along the ray.
+pub(crate) fn of_sphere(ray: &PreparedRay, t: f64, centre: [f32; 3], radius: f32) -> Surface {
+    let normal = prim::surface_normal(ray.origin + t * ray.direction, centre);
+    let centre = wide(centre);
+    let radius = f64::from(radius);
+    at(centre + radius * normal, centre.abs().max_element() + radius, normal)
+}
+
+/// Rounds `point`, whose own error is a few units of `size` in `f64`.
+fn at(point: DVec3, size: f64, normal: DVec3) -> Surface {
+    // Half an ulp of the largest coordinate, the error of `point`, and the least float so that the
+    // bound is never zero.
+    const HALF_ULP: f64 = f32::EPSILON as f64 / 2.0;
+    let bound = point.abs().max_element() * HALF_ULP + size * 32.0 * UNIT;
+    let error = f32_above(bound + f64::from(f32::from_bits(1)));
+    let position = point.to_array().map(|x| x as f32);
+    // Off by at most `error` along each axis, the position is off the surface by at most this.
+    let off = f64::from(error) * (normal.abs().x + normal.abs().y + normal.abs().z);
+    Surface {
+        position,
+        position_error: error,
+        normal: normal.to_array().map(|x| x as f32),
+        front_origin: moved(position, normal * off),
+        back_origin: moved(position, normal * -off),
+    }
+}
+
+/// `position + by`, each coordinate rounded away from `position`.
+fn moved(position: [f32; 3], by: DVec3) -> [f32; 3] {
+    let target = wide(position) + by;
+    [0, 1, 2].map(|k| if by[k] > 0.0 { f32_above(target[k]) } else { f32_below(target[k]) })
+}
