@@ -1,79 +1,17 @@
 //! The face of a built structure.
 
-use core::mem::MaybeUninit;
-
-use crate::block::{Block, Census, Header, KIND_BVH, KIND_GRID, KIND_LIST};
-use crate::error::{BuildError, OpenError, Unsupported};
-use crate::prim::{self, Leaves, Survey, survey};
+use crate::block::{Block, Header, KIND_BVH, KIND_GRID, KIND_LIST};
+use crate::error::OpenError;
+use crate::prim::{self, Leaves};
 use crate::query::{
     Any, Candidate, Closest, Counted, Counts, Filter, Locate, PrimId, Query, QueryOptions,
     flat_number, geometry_of,
 };
 use crate::ray::{Hit, NONE, PreparedRay, Ray};
-use crate::scene::Scene;
-use crate::storage::{self, ALIGNMENT};
+#[cfg(feature = "capi")]
+use crate::storage;
 use crate::surface::{self, Surface};
-use crate::{bvh, grid, list};
-
-/// How much memory a build wants.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Memory {
-    /// Enough for all the options ask, scratch included; a multiple of `alignment`.
-    pub size: usize,
-    /// The least that is accepted; below it the build is refused.
-    pub minimum: usize,
-    /// 64.
-    pub alignment: usize,
-}
-
-/// How much time a build may take for the sake of the rays.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Quality {
-    /// Binned SAH.
-    #[default]
-    Balanced,
-    /// For a structure that is built every frame. Not in this version.
-    Fast,
-    /// For a structure that is built once. Not in this version.
-    Best,
-}
-
-/// How the nodes of a BVH lie in memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Layout {
-    /// What suits this machine.
-    #[default]
-    Automatic,
-    /// Binary nodes of 32 bytes: the least memory.
-    Compact,
-    /// Bundles of 4, 8 or 16 records. Not in this version.
-    Wide(u32),
-}
-
-/// Whether a plain list may stand for the structure asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PlainList {
-    /// For a handful of primitives, which no structure makes faster.
-    #[default]
-    Automatic,
-    /// Never: build the structure even over one primitive.
-    Never,
-    /// Always: every ray is tested against every leaf block.
-    Always,
-}
-
-/// What a build may choose. The default in every field suits most scenes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BuildOptions {
-    /// Time spent on building.
-    pub quality: Quality,
-    /// The layout of a BVH.
-    pub layout: Layout,
-    /// Whether the block must stay refittable. Not in this version.
-    pub refit: bool,
-    /// Whether a plain list may stand in.
-    pub plain_list: PlainList,
-}
+use crate::{bvh, grid};
 
 /// What a block holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,119 +55,6 @@ pub struct Info {
 #[derive(Clone, Copy)]
 pub struct Accel<'m>(Block<'m>);
 
-/// The memory [`build_bvh`] needs for `scene`.
-pub fn bvh_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError> {
-    Ok(Job::new(scene, options, Structure::Bvh)?.memory)
-}
-
-/// The memory [`build_grid`] needs for `scene`.
-pub fn grid_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError> {
-    Ok(Job::new(scene, options, Structure::Grid)?.memory)
-}
-
-/// Builds a BVH over `scene` at the front of `memory`.
-///
-/// `memory` starts at a multiple of 64 bytes and holds at least the minimum of [`bvh_needs`]; with
-/// less than its size the leaves are larger. The finished block is [`Accel::block`]; what lies behind
-/// it is free again. On an error nothing was written.
-pub fn build_bvh<'m>(
-    scene: &Scene,
-    options: &BuildOptions,
-    memory: &'m mut [MaybeUninit<u8>],
-) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, Structure::Bvh)?.run(memory)
-}
-
-/// Builds a regular grid over `scene` at the front of `memory`.
-///
-/// `memory` starts at a multiple of 64 bytes and holds at least the minimum of [`grid_needs`]; with
-/// less than its size the grid is coarser, a fifth of its cells along each axis at a time. The
-/// finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
-/// written.
-pub fn build_grid<'m>(
-    scene: &Scene,
-    options: &BuildOptions,
-    memory: &'m mut [MaybeUninit<u8>],
-) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, Structure::Grid)?.run(memory)
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Structure {
-    List,
-    Grid,
-    Bvh,
-}
-
-/// A build that was checked and sized, but not begun.
-struct Job<'s, 'a> {
-    scene: &'s Scene<'a>,
-    survey: Survey,
-    census: Census,
-    structure: Structure,
-    memory: Memory,
-}
-
-impl<'s, 'a> Job<'s, 'a> {
-    fn new(
-        scene: &'s Scene<'a>,
-        options: &BuildOptions,
-        asked: Structure,
-    ) -> Result<Self, BuildError> {
-        options.check()?;
-        let survey = survey(scene)?;
-        let census = Census::take(scene, &survey);
-        let handful = match options.plain_list {
-            PlainList::Automatic => list::HANDFUL,
-            PlainList::Never => 0,
-            PlainList::Always => u32::MAX,
-        };
-        let structure = if census.hittable() <= handful { Structure::List } else { asked };
-        let (size, minimum) = match structure {
-            Structure::List => list::needs(&survey, &census)?,
-            Structure::Grid => grid::needs(scene, &survey, &census)?,
-            Structure::Bvh => bvh::needs(&survey, &census)?,
-        };
-        let memory = Memory { size, minimum, alignment: ALIGNMENT };
-        Ok(Job { scene, survey, census, structure, memory })
-    }
-
-    fn run<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
-        let Memory { size, minimum, alignment } = self.memory;
-        if memory.as_ptr().addr() % alignment != 0 {
-            return Err(BuildError::Misaligned);
-        }
-        if memory.len() < minimum {
-            return Err(BuildError::OutOfMemory { minimum });
-        }
-        let usable = memory.len().min(size);
-        let bytes = storage::zeroed(&mut memory[..usable]);
-        let build = match self.structure {
-            Structure::List => list::build,
-            Structure::Grid => grid::build,
-            Structure::Bvh => bvh::build,
-        };
-        build(self.scene, &self.survey, &self.census, bytes)?;
-        // A block that was just sealed splits again, so this error does not arise.
-        Block::split(bytes).map(Accel).map_err(|_| BuildError::OutOfMemory { minimum })
-    }
-}
-
-impl BuildOptions {
-    fn check(&self) -> Result<(), BuildError> {
-        let unsupported = if self.quality != Quality::Balanced {
-            Unsupported::Quality
-        } else if matches!(self.layout, Layout::Wide(_)) {
-            Unsupported::Layout
-        } else if self.refit {
-            Unsupported::Refit
-        } else {
-            return Ok(());
-        };
-        Err(BuildError::Unsupported(unsupported))
-    }
-}
-
 impl<'m> Accel<'m> {
     /// Opens a block that was built earlier, after checking it from end to end; nothing is copied.
     ///
@@ -237,14 +62,13 @@ impl<'m> Accel<'m> {
     /// accepted can be queried without reading outside, panicking or looping; whether its boxes and
     /// vertices make sense is not checked.
     pub fn open(block: &'m [u8]) -> Result<Self, OpenError> {
-        let accel = Accel(Block::split(block)?);
+        let accel = Accel::recognise(block)?;
         if accel.is_sound() { Ok(accel) } else { Err(OpenError::Corrupt) }
     }
 
-    /// The accel of a block that was just built.
-    #[cfg(feature = "alloc")]
-    pub(crate) fn built(block: &'m [u8]) -> Accel<'m> {
-        Accel(Block::split(block).expect("a sealed block has a sound header"))
+    /// The accel of a block that a build or [`open`](Self::open) returned: only the header is read.
+    pub(crate) fn recognise(block: &'m [u8]) -> Result<Self, OpenError> {
+        Block::split(block).map(Accel)
     }
 
     /// The accel of a block that a build or [`open`](Self::open) returned.
@@ -259,7 +83,7 @@ impl<'m> Accel<'m> {
         let size = unsafe { Block::size_at(block) };
         // SAFETY: a block has as many bytes as its header says.
         let bytes = unsafe { storage::from_raw(block, size) };
-        Block::split(bytes).ok().map(Accel)
+        Accel::recognise(bytes).ok()
     }
 
     fn is_sound(&self) -> bool {

@@ -47,6 +47,7 @@ compile_error!("raykern needs square roots: enable the feature `std` or the feat
 
 mod accel;
 mod block;
+mod build;
 mod bvh;
 mod error;
 mod grid;
@@ -61,9 +62,9 @@ mod scene;
 mod storage;
 mod surface;
 
-pub use accel::{
-    Accel, BuildOptions, Info, Kind, Layout, Memory, PlainList, Quality, build_bvh, build_grid,
-    bvh_needs, grid_needs,
+pub use accel::{Accel, Info, Kind};
+pub use build::{
+    BuildOptions, Layout, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
 };
 pub use error::{BuildError, OpenError, Unsupported};
 #[cfg(feature = "alloc")]

@@ -1,8 +1,9 @@
 //! A plain list of leaf blocks: what a handful of primitives needs.
 
+use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{Census, Counts, KIND_LIST, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{Packer, SPHERES, Shape, Survey, TRIANGLES_AT_LEAST, for_each_prim, geometries};
+use crate::prim::{Packer, Shape, Survey, for_each_prim, geometries};
 use crate::scene::Scene;
 
 /// Up to this many primitives no structure is faster than testing them all.

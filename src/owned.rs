@@ -1,6 +1,7 @@
 //! A built structure in memory of its own: the outer shell, and the only place that allocates.
 
-use crate::accel::{Accel, BuildOptions, Memory, build_bvh, build_grid, bvh_needs, grid_needs};
+use crate::accel::Accel;
+use crate::build::{BuildOptions, Memory, build_bvh, build_grid, bvh_needs, grid_needs};
 use crate::error::BuildError;
 use crate::scene::Scene;
 use crate::storage::AlignedMemory;
@@ -37,7 +38,7 @@ impl OwnedAccel {
 
     /// The structure. Cheap, but not free: keep the view while tracing.
     pub fn accel(&self) -> Accel<'_> {
-        Accel::built(self.memory.bytes())
+        Accel::recognise(self.memory.bytes()).expect("a built block has a sound header")
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a ray may ask: its options, and the traversal's side of the question.
 
+use crate::block::Geometry;
 use crate::ray::{NONE, PreparedRay};
-use crate::storage::Plain;
 
 /// Which of two sides of a surface a ray may meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,25 +49,6 @@ pub struct Counts {
     /// Triangles and spheres tested.
     pub tests: u64,
 }
-
-/// One geometry of the scene: a mesh or a sphere set.
-///
-/// ```text
-/// byte 0            4      8
-///      | first prim | mask |
-/// ```
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct Geometry {
-    /// The flat number of its first primitive.
-    pub first: u32,
-    pub mask: u32,
-}
-const _: () = assert!(size_of::<Geometry>() == 8);
-
-// SAFETY: two numbers of equal size.
-#[allow(unsafe_code, reason = "a promise about the layout drawn above")]
-unsafe impl Plain for Geometry {}
 
 /// A primitive that the ray meets within its limits.
 #[derive(Clone, Copy, Debug)]

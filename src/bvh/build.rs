@@ -1,12 +1,11 @@
 //! From a scene to a finished BVH in the caller's memory.
 
+use super::MAX_DEPTH;
 use super::tree::{Grown, PrimRef, grow, leaf_budget};
-use super::{BvhNode, MAX_DEPTH};
-use crate::block::{Census, Counts, KIND_BVH, PartsMut};
+use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
+use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{
-    Packer, SPHERES, Shape, Survey, TRIANGLES_AT_LEAST, for_each_prim, geometries, shape,
-};
+use crate::prim::{Packer, Shape, Survey, for_each_prim, geometries, shape};
 use crate::scene::Scene;
 use crate::storage;
 

@@ -1,13 +1,11 @@
 //! A bounding volume hierarchy: a binary tree of 32-byte nodes over the leaf blocks.
 
 mod build;
-mod node;
 mod traverse;
 mod tree;
 mod validate;
 
 pub(crate) use build::{build, needs};
-pub(crate) use node::BvhNode;
 pub(crate) use traverse::traverse;
 pub(crate) use validate::tree_is_sound;
 

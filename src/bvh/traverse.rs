@@ -1,6 +1,7 @@
 //! The one loop over the tree.
 
-use super::{BvhNode, MAX_DEPTH};
+use super::MAX_DEPTH;
+use crate::block::BvhNode;
 use crate::prim::Leaves;
 use crate::query::Query;
 use crate::ray::PreparedRay;

@@ -4,7 +4,8 @@
 
 use glam::DVec3;
 
-use super::{BvhNode, LEAF_MAX, MAX_DEPTH};
+use super::{LEAF_MAX, MAX_DEPTH};
+use crate::block::BvhNode;
 use crate::math::Aabb;
 use crate::storage::Plain;
 

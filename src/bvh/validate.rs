@@ -1,6 +1,7 @@
 //! Whether the tree of a foreign block can be traversed.
 
-use super::{BvhNode, MAX_DEPTH};
+use super::MAX_DEPTH;
+use crate::block::BvhNode;
 use crate::prim::Leaves;
 
 /// Whether the nodes form one tree, no deeper than a traversal's stack, whose leaves exist.

@@ -1,14 +1,12 @@
 //! From a scene to a finished grid in the caller's memory: count, prefix sum, fill.
 
 use super::plan::Plan;
-use super::{EMPTY, GridHead, LAST, Run, run_word};
+use crate::block::cells::{EMPTY, GridHead, LAST, Run, run_word};
+use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, SphereBlock, TriangleBlock, block_ref};
 use crate::block::{Census, Counts, KIND_GRID, PartsMut};
 use crate::error::BuildError;
 use crate::math::Aabb;
-use crate::prim::{
-    KIND_SPHERES, KIND_TRIANGLES, Packer, Shape, SphereBlock, Survey, TriangleBlock, block_ref,
-    for_each_prim, geometries, shape,
-};
+use crate::prim::{Packer, Shape, Survey, for_each_prim, geometries, shape};
 use crate::scene::Scene;
 
 /// The bytes for the grid that the rule wants, and the bytes below which there is none.

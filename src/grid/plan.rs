@@ -2,11 +2,13 @@
 
 use glam::DVec3;
 
-use super::{DILATION, GridHead, VALUE};
+use super::DILATION;
+use crate::block::cells::{GridHead, VALUE};
+use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{Census, Counts};
 use crate::error::BuildError;
 use crate::math::{Aabb, wide};
-use crate::prim::{SPHERES, Survey, TRIANGLES_AT_LEAST, for_each_prim};
+use crate::prim::{Survey, for_each_prim};
 use crate::scene::Scene;
 
 /// References from cells to primitives, for each primitive, above which a grid is made coarser. A

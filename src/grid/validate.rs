@@ -1,7 +1,8 @@
 //! Whether the grid of a foreign block can be traversed.
 
-use super::{EMPTY, GridHead, LAST, Run, run_start};
-use crate::prim::{LeafRef, Leaves};
+use crate::block::cells::{EMPTY, GridHead, LAST, Run, run_start};
+use crate::block::leaf::LeafRef;
+use crate::prim::Leaves;
 
 /// Whether the one grid has just the words there are, each run belongs to one cell, and every entry
 /// names lanes that exist.

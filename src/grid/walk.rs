@@ -1,6 +1,7 @@
 //! The walk of a ray through the cells.
 
-use super::{DILATION, EMPTY, GridHead, Run, run_start};
+use super::DILATION;
+use crate::block::cells::{EMPTY, GridHead, Run, run_start};
 use crate::math::rounding::UNIT;
 use crate::prim::Leaves;
 use crate::query::Query;

@@ -1,11 +1,11 @@
 //! The scene as a run of flat numbers: which primitives can be hit, and where they are.
 
 use super::triangle::has_area;
-use crate::block::Census;
+use crate::block::{Census, Geometry};
 use crate::error::BuildError;
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
-use crate::query::{Geometry, geometry_of};
+use crate::query::geometry_of;
 use crate::scene::Scene;
 
 /// Flat numbers and block references leave two bits for other uses.

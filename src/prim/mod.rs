@@ -1,22 +1,18 @@
 //! What can be hit: the layer that list, grid and BVH stand on.
 
-mod block;
 mod gather;
 mod pack;
 mod sphere;
 mod triangle;
 mod validate;
 
-pub(crate) use block::{
-    KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES_AT_LEAST, TriangleBlock,
-    block_ref,
-};
 pub(crate) use gather::{Shape, Survey, for_each_prim, geometries, shape, survey};
 pub(crate) use pack::Packer;
 pub(crate) use sphere::surface_normal;
 pub(crate) use triangle::normal;
 pub(crate) use validate::leaves_are_sound;
 
+use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SphereBlock, TriangleBlock};
 use crate::query::{Candidate, Query};
 use crate::ray::PreparedRay;
 

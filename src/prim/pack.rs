@@ -1,10 +1,10 @@
 //! Fills leaf blocks, each to the end before the next.
 
-use super::block::{
+use super::gather::Shape;
+use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock,
     block_ref,
 };
-use super::gather::Shape;
 use crate::math::Aabb;
 
 /// Primitives go in one by one and come to lie in blocks, in the order of their coming.

@@ -1,8 +1,8 @@
 //! Whether the leaf blocks of a foreign block can be traversed.
 
 use super::Leaves;
-use super::block::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, TRIANGLES};
-use crate::query::Geometry;
+use crate::block::Geometry;
+use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, TRIANGLES};
 
 /// Whether every lane in use has an id, triangles below `triangle_limit` and spheres from there to
 /// `prim_limit`, and whether the geometries number them all.

@@ -2,8 +2,8 @@
 
 #![allow(unsafe_code, reason = "a promise about the layout drawn here")]
 
+use super::leaf::LeafRef;
 use crate::math::Aabb;
-use crate::prim::LeafRef;
 use crate::storage::Plain;
 
 /// A box and what it holds.

@@ -9,12 +9,18 @@
 //! block can be copied, written to a file or placed in ROM. The order lets a build finish a part
 //! before it must know the size of the next.
 
-use crate::bvh::BvhNode;
+pub(crate) mod cells;
+pub(crate) mod leaf;
+mod node;
+
+pub(crate) use leaf::Geometry;
+pub(crate) use node::BvhNode;
+
+use cells::{GridHead, Run};
+use leaf::{SphereBlock, TriangleBlock};
+
 use crate::error::OpenError;
-use crate::grid::{GridHead, Run};
 use crate::math::Aabb;
-use crate::prim::{SphereBlock, TriangleBlock};
-use crate::query::Geometry;
 use crate::storage::{self, Plain, align_up};
 
 const MAGIC: [u8; 8] = *b"raykern\0";

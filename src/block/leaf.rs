@@ -1,4 +1,4 @@
-//! Leaf blocks: the primitives as every structure stores them.
+//! Geometries and leaf blocks: the primitives as every structure stores them.
 
 #![allow(unsafe_code, reason = "promises about the layouts drawn here")]
 
@@ -124,6 +124,24 @@ impl SphereBlock {
 pub(crate) fn low_bits(n: u32) -> u32 {
     (1 << n.min(16)) - 1
 }
+
+/// One geometry of the scene: a mesh or a sphere set.
+///
+/// ```text
+/// byte 0            4      8
+///      | first prim | mask |
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Geometry {
+    /// The flat number of its first primitive.
+    pub first: u32,
+    pub mask: u32,
+}
+const _: () = assert!(size_of::<Geometry>() == 8);
+
+// SAFETY: two numbers of equal size.
+unsafe impl Plain for Geometry {}
 
 /// Which lanes of which leaf block: what a leaf of a BVH and an entry of a grid cell refer to.
 ///
