@@ -28,7 +28,7 @@ pub(crate) struct TriangleHit {
 ///
 /// Weights: `d . (p x q)` for the edge from `p` to `q`, both relative to the origin, as
 /// `d . ((p + q) x (q - p)) / 2`, whose error grows with the edge and not with the distance.
-/// Source: \[DHH10\]; the antisymmetric form is the one of Pluecker coordinates.
+/// Source: \[DEG12\]; the antisymmetric form is that of Pluecker coordinates.
 pub(crate) fn intersect(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<TriangleHit> {
     let [a, b, c] = triangle.map(wide);
     let o = ray.origin;

@@ -1,0 +1,81 @@
+#!/usr/bin/env bash
+# Everything that must hold before a change lands. Needs Rust and a C compiler; installs the rest
+# (Debian packages by name). Under 15 minutes on two cores.
+#
+#   ./check.sh            all of it
+#   ./check.sh STEP ...   some of it: format clippy build test docs header c embree compare
+set -euo pipefail
+cd "$(dirname "$0")"
+export CARGO_TERM_COLOR=never
+
+step_install() {
+    local missing=()
+    command -v cc >/dev/null || missing+=(gcc libc6-dev)
+    command -v c++ >/dev/null || missing+=(g++)
+    command -v make >/dev/null || missing+=(make)
+    [ -e /usr/include/embree3/rtcore.h ] || missing+=(libembree-dev)
+    [ ${#missing[@]} -eq 0 ] && return
+    local sudo=()
+    [ "$(id -u)" -eq 0 ] || sudo=(sudo)
+    "${sudo[@]}" apt-get update -qq
+    "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+        "${missing[@]}"
+}
+
+step_format() { cargo fmt --all -- --check; }
+
+step_clippy() {
+    cargo clippy --workspace --all-targets -- -D warnings
+    cargo clippy -p raykern --features capi --all-targets -- -D warnings
+    cargo clippy -p raykern --no-default-features --features libm,capi --lib -- -D warnings
+}
+
+# The sets of features that programs choose, each without the others' leftovers.
+step_build() {
+    cargo build -p raykern --lib --no-default-features --features libm
+    cargo build -p raykern --lib --no-default-features --features libm,alloc
+    cargo build -p raykern --lib --no-default-features --features libm,capi
+    cargo build -p raykern --lib --features capi
+    if cargo check -q -p raykern --lib --no-default-features 2>/dev/null; then
+        echo "a build without std and without libm must be refused" >&2
+        return 1
+    fi
+}
+
+step_test() { cargo test --workspace --features raykern/capi; }
+
+step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features raykern/capi; }
+
+# The committed header is what the sources give.
+step_header() {
+    local before
+    before=$(mktemp)
+    cp include/raykern.h "$before"
+    cargo build -p raykern --lib --features header
+    if ! cmp -s include/raykern.h "$before"; then
+        diff -u "$before" include/raykern.h || true
+        cp "$before" include/raykern.h
+        echo "include/raykern.h is stale: cargo build --features header writes it again" >&2
+        return 1
+    fi
+}
+
+# The C programs once more, with address and undefined-behaviour sanitizers.
+step_c() { RAYKERN_SANITIZE=1 cargo test --features capi --test c_programs; }
+
+# A million rays a scene against Embree, every difference judged exactly.
+step_embree() {
+    cargo test --release -p raykern-harness --features embree --test compare_embree -- --nocapture
+}
+
+# The main job, cut short.
+step_compare() { cargo run --release --example compare -- --runs 2 --budget 20 --out target/compare-check; }
+
+steps=(install format clippy build test docs header c embree compare)
+[ $# -eq 0 ] || steps=("$@")
+for step in "${steps[@]}"; do
+    started=$SECONDS
+    echo "== $step"
+    "step_$step"
+    echo "== $step: $((SECONDS - started)) s"
+done
