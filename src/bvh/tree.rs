@@ -55,7 +55,7 @@ impl Grown {
 }
 
 /// Cost of a step to two children, in tests of one primitive.
-const STEP_COST: f64 = 1.0;
+const STEP_COST: f64 = 2.0;
 const BINS: usize = 16;
 
 /// A subtree to build: the refs `first .. first + count` under node `node`.

@@ -17,6 +17,10 @@ const REFERENCES_PER_PRIM: u64 = 32;
 /// A scene of few primitives may have this many references in any case.
 const REFERENCES_AT_LEAST: u64 = 4096;
 
+/// An axis whose extent is less than this part of the widest one is not divided: cells so thin
+/// would make stepping unsafe for rays that start a few thousand widths away.
+const FLAT: f64 = 1.0 / 4096.0;
+
 /// A grid that was not built yet.
 pub(crate) struct Plan {
     pub head: GridHead,
@@ -49,7 +53,7 @@ impl GridHead {
         let mut head =
             GridHead { lower: [0.0; 3], cell: [0.0; 3], resolution: [n; 3], first_word: 0 };
         for k in 0..3 {
-            let flat = extent[k] < widest / f64::from(1 << 20);
+            let flat = extent[k] < widest * FLAT;
             let cells = if flat { 1 } else { n };
             let cell = if flat { widest } else { extent[k] } / f64::from(n);
             let margin = if flat { cell / 2.0 } else { 2.0 * DILATION * cell };
