@@ -1,3 +1,7 @@
 //! What surrounds the core: loaders, scene makers, a renderer, an exact oracle, statistics.
 
+pub mod load;
+pub mod make;
 pub mod model;
+pub mod render;
+pub mod shared_scenes;
