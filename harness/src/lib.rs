@@ -3,5 +3,7 @@
 pub mod load;
 pub mod make;
 pub mod model;
+pub mod oracle;
+pub mod rays;
 pub mod render;
 pub mod shared_scenes;
