@@ -154,7 +154,7 @@ impl<'m> Accel<'m> {
         let ray = ray.prepare()?;
         let mut query = Closest::new(self.filter(options), &ray);
         self.ask(&ray, &mut query);
-        query.best.map(|best| self.hit(&best))
+        query.best.map(|best| self.hit(&ray, &best))
     }
 
     /// Whether anything that `options` leaves is hit.
@@ -185,7 +185,7 @@ impl<'m> Accel<'m> {
         let query = Closest::new(self.filter(&QueryOptions::default()), &ray);
         let mut counted = Counted { query, counts };
         self.ask(&ray, &mut counted);
-        counted.query.best.map(|best| self.hit(&best))
+        counted.query.best.map(|best| self.hit(&ray, &best))
     }
 
     /// [`occluded`](Self::occluded) that adds what it did to `counts`.
@@ -239,12 +239,13 @@ impl<'m> Accel<'m> {
     }
 
     /// The record of a candidate that won.
-    fn hit(&self, best: &Candidate) -> Hit {
+    fn hit(&self, ray: &PreparedRay, best: &Candidate) -> Hit {
         let place = geometry_of(best.prim, self.0.geometries);
         let (geometry, first) = place.map_or((NONE, 0), |(number, g)| (number, g.first));
         let [u, v] = rounded_weights(best.weights);
         // Adding +0 turns -0 into +0.
-        Hit { t: best.t as f32 + 0.0, u, v, prim: best.prim - first, geometry, instance: NONE }
+        let t = best.rounded_t(ray) + 0.0;
+        Hit { t, u, v, prim: best.prim - first, geometry, instance: NONE }
     }
 }
 

@@ -50,6 +50,7 @@ mod block;
 mod build;
 mod bvh;
 mod error;
+mod exact;
 mod grid;
 mod list;
 mod math;

@@ -1,6 +1,9 @@
 //! What a ray may ask: its options, and the traversal's side of the question.
 
+use core::cmp::Ordering;
+
 use crate::block::Geometry;
+use crate::exact::Quotient;
 use crate::ray::{NONE, PreparedRay};
 
 /// Which of two sides of a surface a ray may meet.
@@ -56,6 +59,8 @@ pub(crate) struct Candidate {
     pub t: f64,
     /// A bound on the error of `t`.
     pub t_error: f64,
+    /// The triangle, from which the real `t` follows; `None` for a sphere.
+    pub triangle: Option<[[f32; 3]; 3]>,
     /// Weights of the triangle's second and third vertex.
     pub weights: [f64; 2],
     /// The flat number of the primitive.
@@ -66,6 +71,28 @@ pub(crate) struct Candidate {
     pub front: bool,
     /// Whether skipping the primitive skips this hit: false for the far root of a sphere.
     pub skippable: bool,
+}
+
+impl Candidate {
+    /// The order along the ray; of triangles that of the real `t`. Equal ones are ordered by number.
+    fn order(&self, other: &Candidate, ray: &PreparedRay) -> Ordering {
+        let apart = (self.t - other.t).abs() > 1.01 * (self.t_error + other.t_error);
+        let by_t = match (self.triangle, other.triangle) {
+            (Some(p), Some(q)) if !apart => Quotient::new(ray, p).compare(&Quotient::new(ray, q)),
+            _ => self.t.partial_cmp(&other.t).unwrap_or(Ordering::Equal),
+        };
+        by_t.then(self.prim.cmp(&other.prim))
+    }
+
+    /// The nearest `f32` to `t`; for triangles to the real one, ties to even.
+    pub fn rounded_t(&self, ray: &PreparedRay) -> f32 {
+        let near = self.t as f32;
+        let sure = (self.t - self.t_error) as f32 == near && (self.t + self.t_error) as f32 == near;
+        match self.triangle {
+            Some(triangle) if !sure => Quotient::new(ray, triangle).round(near),
+            _ => near,
+        }
+    }
 }
 
 /// The question a traversal answers: it offers candidates and obeys the bound.
@@ -135,33 +162,34 @@ pub(crate) fn flat_number(id: &PrimId, geometries: &[Geometry], prim_limit: u32)
 }
 
 /// The closest hit: least `t`, and of equal ones the first primitive.
-pub(crate) struct Closest<'m> {
+pub(crate) struct Closest<'q, 'm> {
+    ray: &'q PreparedRay,
     filter: Filter<'m>,
     t_bound: f64,
     pub best: Option<Candidate>,
 }
 
-impl<'m> Closest<'m> {
-    pub fn new(filter: Filter<'m>, ray: &PreparedRay) -> Self {
-        Closest { filter, t_bound: ray.t_max, best: None }
+impl<'q, 'm> Closest<'q, 'm> {
+    pub fn new(filter: Filter<'m>, ray: &'q PreparedRay) -> Self {
+        Closest { ray, filter, t_bound: ray.t_max, best: None }
     }
 }
 
-impl Query for Closest<'_> {
+impl Query for Closest<'_, '_> {
     fn t_bound(&self) -> f64 {
         self.t_bound
     }
 
     fn accept(&mut self, candidate: &Candidate) -> bool {
+        // The grid offers a primitive once for each cell that holds it.
         let first = self.best.is_none_or(|best| {
-            candidate.t < best.t || (candidate.t == best.t && candidate.prim < best.prim)
+            (candidate.prim != best.prim || candidate.triangle.is_none())
+                && candidate.order(&best, self.ray) == Ordering::Less
         });
         if first && self.filter.lets_pass(candidate) {
             self.best = Some(*candidate);
-            // Boxes are compared with real distances. The margin is the error of this `t`, once
-            // more for the error of the `t` that would have to beat it, and some.
-            let margin = 2.0 * candidate.t_error + candidate.t.abs() * 1e-9;
-            self.t_bound = self.t_bound.min(candidate.t + margin);
+            // Boxes are compared with real distances, so the bound is one of the real `t`.
+            self.t_bound = self.t_bound.min(candidate.t + 1.01 * candidate.t_error);
         }
         false
     }
@@ -192,27 +220,28 @@ impl Query for Any<'_> {
 }
 
 /// Finds the one hit with this primitive and this rounded `t` again.
-pub(crate) struct Locate {
+pub(crate) struct Locate<'q> {
+    ray: &'q PreparedRay,
     prim: u32,
     t: f32,
     t_max: f64,
     pub found: Option<Candidate>,
 }
 
-impl Locate {
-    pub fn new(prim: u32, t: f32, ray: &PreparedRay) -> Self {
+impl<'q> Locate<'q> {
+    pub fn new(prim: u32, t: f32, ray: &'q PreparedRay) -> Self {
         // The real `t` rounds to the given one, so it lies below the next float.
-        Locate { prim, t, t_max: ray.t_max.min(f64::from(t.next_up())), found: None }
+        Locate { ray, prim, t, t_max: ray.t_max.min(f64::from(t.next_up())), found: None }
     }
 }
 
-impl Query for Locate {
+impl Query for Locate<'_> {
     fn t_bound(&self) -> f64 {
         self.t_max
     }
 
     fn accept(&mut self, candidate: &Candidate) -> bool {
-        if candidate.prim == self.prim && candidate.t as f32 == self.t {
+        if candidate.prim == self.prim && candidate.rounded_t(self.ray) == self.t {
             self.found = Some(*candidate);
         }
         self.found.is_some()

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::math::rounding::gamma;
-use crate::math::{Aabb, wide};
+use crate::math::{Aabb, sum_abs, wide};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".
 pub const NONE: u32 = u32::MAX;
@@ -81,6 +81,8 @@ pub(crate) struct PreparedRay {
     pub direction: DVec3,
     /// `1 / direction`, infinite with the sign of a zero component.
     pub inverse: DVec3,
+    /// The sum of the direction's absolute components.
+    pub direction_size: f64,
     /// At least `-f32::MAX`.
     pub t_min: f64,
     /// At most `f32::MAX`: a `t` beyond it is a miss.
@@ -111,6 +113,7 @@ impl Ray {
             origin: wide(self.origin),
             direction,
             inverse: 1.0 / direction,
+            direction_size: sum_abs(direction),
             t_min,
             t_max,
         })

@@ -58,3 +58,9 @@ impl Aabb {
 pub(crate) fn wide(p: [f32; 3]) -> DVec3 {
     DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
+
+/// `|x| + |y| + |z|`.
+pub(crate) fn sum_abs(v: DVec3) -> f64 {
+    let v = v.abs();
+    v.x + v.y + v.z
+}

@@ -30,32 +30,172 @@ fn split(a: f64) -> (f64, f64) {
     (high, a - high)
 }
 
-/// The exact sign of `terms[0] + terms[1] + ...`, as its order against zero.
-pub(crate) fn sign_of_sum<const N: usize>(terms: [f64; N]) -> Ordering {
-    // `row[.. i]` is a sum without overlap, ordered by size, equal to the first `i` terms.
-    let mut row = [0.0; N];
-    for (i, term) in terms.into_iter().enumerate() {
-        let mut carried = term;
-        for entry in &mut row[..i] {
-            (carried, *entry) = two_sum(carried, *entry);
-        }
-        row[i] = carried;
+/// A real number as a sum of floats that do not overlap, the smallest first.
+///
+/// Holds every polynomial of up to sixth degree in `f32`s, whatever their exponents: such a number is
+/// a multiple of 2^-894 and below 2^776, so no term underflows or overflows, and 1670 bits are 32
+/// terms once they are packed tightly.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Expansion {
+    terms: [f64; CAPACITY],
+    count: usize,
+}
+
+/// Room for 32 tight terms and for what gathers until they are packed again.
+const CAPACITY: usize = 48;
+
+impl Expansion {
+    pub const ZERO: Expansion = Expansion { terms: [0.0; CAPACITY], count: 0 };
+
+    /// `a - b`.
+    pub fn difference(a: f64, b: f64) -> Self {
+        let mut difference = Expansion::ZERO;
+        difference.add(a);
+        difference.add(-b);
+        difference
     }
-    // Entries do not overlap, so the last one that is not zero outweighs all before it.
-    let largest = row.into_iter().rev().find(|x| *x != 0.0).unwrap_or(0.0);
-    largest.partial_cmp(&0.0).unwrap_or(Ordering::Equal)
+
+    /// Adds one float.
+    pub fn add(&mut self, x: f64) {
+        if self.count == CAPACITY {
+            self.pack();
+        }
+        let (mut carried, mut kept) = (x, 0);
+        for i in 0..self.count {
+            let (sum, rest) = two_sum(carried, self.terms[i]);
+            carried = sum;
+            kept = self.keep(kept, rest);
+        }
+        self.count = self.keep(kept, carried);
+    }
+
+    /// Adds `a * b`.
+    pub fn add_product(&mut self, a: &Expansion, b: &Expansion) {
+        for x in a.terms() {
+            for y in b.terms() {
+                let (product, rest) = two_product(*x, *y);
+                self.add(rest);
+                self.add(product);
+            }
+        }
+    }
+
+    /// `a * b - c * d`.
+    pub fn cross(a: &Expansion, b: &Expansion, c: &Expansion, d: &Expansion) -> Self {
+        let mut cross = Expansion::ZERO;
+        cross.add_product(a, b);
+        cross.add_product(&c.negated(), d);
+        cross
+    }
+
+    pub fn negated(&self) -> Self {
+        Expansion { terms: self.terms.map(|x| -x), count: self.count }
+    }
+
+    /// The order of the number against zero.
+    pub fn sign(&self) -> Ordering {
+        // Terms do not overlap, so the last one outweighs all before it.
+        let largest = self.terms().last().copied().unwrap_or(0.0);
+        largest.partial_cmp(&0.0).unwrap_or(Ordering::Equal)
+    }
+
+    /// The number within one unit in the last place.
+    pub fn approximate(&self) -> f64 {
+        self.terms().iter().sum()
+    }
+
+    fn terms(&self) -> &[f64] {
+        &self.terms[..self.count]
+    }
+
+    /// Writes `x` at place `kept` unless it is zero; returns the next free place.
+    fn keep(&mut self, kept: usize, x: f64) -> usize {
+        if x == 0.0 {
+            return kept;
+        }
+        if let Some(term) = self.terms.get_mut(kept) {
+            *term = x;
+        }
+        kept + 1
+    }
+
+    /// Packs the bits into as few terms as hold them, each at least 53 bits below the next.
+    fn pack(&mut self) {
+        // Downwards, each sum takes in all that it can; what it cannot is carried on.
+        let mut bottom = self.count;
+        let mut carried = 0.0;
+        for i in (0..self.count).rev() {
+            let (sum, rest) = two_sum(carried, self.terms[i]);
+            carried = if rest == 0.0 {
+                sum
+            } else {
+                bottom -= 1;
+                self.terms[bottom] = sum;
+                rest
+            };
+        }
+        // Upwards again, which brings the terms to the front.
+        let (top, mut kept) = (self.count, 0);
+        for i in bottom..top {
+            let (sum, rest) = two_sum(self.terms[i], carried);
+            carried = sum;
+            kept = self.keep(kept, rest);
+        }
+        self.count = self.keep(kept, carried);
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::vec::Vec;
+
+    fn sum(terms: &[f64]) -> Expansion {
+        let mut sum = Expansion::ZERO;
+        terms.iter().for_each(|x| sum.add(*x));
+        sum
+    }
 
     #[test]
     fn what_rounding_loses_still_decides() {
-        assert_eq!(sign_of_sum([1e30, 1.0, -1e30]), Ordering::Greater);
-        assert_eq!(sign_of_sum([1e30, -1e-60, -1e30, 0.0]), Ordering::Less);
-        assert_eq!(sign_of_sum([0.1, 0.2, -0.1, -0.2]), Ordering::Equal);
-        assert_eq!(sign_of_sum([3.0, 1e-300, -2.0, -1.0]), Ordering::Greater);
+        assert_eq!(sum(&[1e30, 1.0, -1e30]).sign(), Ordering::Greater);
+        assert_eq!(sum(&[1e30, -1e-60, -1e30, 0.0]).sign(), Ordering::Less);
+        assert_eq!(sum(&[0.1, 0.2, -0.1, -0.2]).sign(), Ordering::Equal);
+        assert_eq!(sum(&[3.0, 1e-300, -2.0, -1.0]).sign(), Ordering::Greater);
+        assert_eq!(sum(&[1e30, 0.5, -1e30]).approximate(), 0.5);
+    }
+
+    #[test]
+    fn more_terms_than_fit_are_packed() {
+        // Single bits, 16 apart: they do not overlap, and there are more than fit unpacked.
+        let bits: Vec<f64> = (-50..50).map(|i| 2f64.powi(16 * i)).collect();
+        let mut number = sum(&bits);
+        assert!(number.count <= CAPACITY);
+        bits.iter().rev().for_each(|x| number.add(-x));
+        assert_eq!(number.sign(), Ordering::Equal);
+        assert_eq!(number.count, 0);
+    }
+
+    #[test]
+    fn sixth_degree_of_the_extremes_is_exact() {
+        // (a^3)(b^3) - (b^3)(a^3) cancels, and one unit of the least size tips it.
+        let (a, b) = (f64::from(f32::from_bits(1)), f64::from(f32::MAX));
+        let cube = |x: f64, y: f64| {
+            let (x, y) = (sum(&[x]), Expansion::difference(y, x));
+            let mut square = Expansion::ZERO;
+            square.add_product(&y, &y);
+            let mut cube = Expansion::ZERO;
+            cube.add_product(&square, &x);
+            cube.add_product(&square, &y);
+            cube
+        };
+        let (p, q) = (cube(a, b), cube(b, a));
+        let mut number = Expansion::cross(&p, &q, &q, &p);
+        assert_eq!(number.sign(), Ordering::Equal);
+        number.add(a.powi(6));
+        assert_eq!(number.sign(), Ordering::Greater);
+        let smallest = cube(a, 2.0 * a);
+        assert_eq!(smallest.approximate(), 2.0 * a.powi(3));
     }
 
     #[test]

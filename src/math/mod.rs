@@ -5,4 +5,4 @@ pub(crate) mod expansion;
 pub(crate) mod float;
 pub(crate) mod rounding;
 
-pub(crate) use aabb::{Aabb, wide};
+pub(crate) use aabb::{Aabb, sum_abs, wide};

@@ -85,11 +85,15 @@ impl Leaves<'_> {
         query: &mut Q,
     ) -> bool {
         Lanes(lanes & block.lanes()).any(|lane| {
-            let Some(hit) = triangle::intersect(ray, block.triangle(lane)) else { return false };
-            ray.holds(hit.t)
+            let triangle = block.triangle(lane);
+            let Some(hit) = triangle::intersect(ray, triangle) else { return false };
+            // What lies beyond the best hit so far is not looked at closely.
+            hit.t - 1.01 * hit.t_error <= query.t_bound()
+                && hit.is_within(ray, triangle)
                 && query.accept(&Candidate {
                     t: hit.t,
                     t_error: hit.t_error,
+                    triangle: Some(triangle),
                     weights: hit.weights,
                     prim: self.prim_id(block.first, lane),
                     place: (number as u32, lane as u32),
@@ -116,6 +120,7 @@ impl Leaves<'_> {
                     && query.accept(&Candidate {
                         t: roots.t[root],
                         t_error: roots.t_error,
+                        triangle: None,
                         weights: [0.0; 2],
                         prim: self.prim_id(block.first, lane),
                         place: (number as u32, lane as u32),

@@ -1,12 +1,12 @@
-//! Ray against triangle in `f64`.
+//! Ray against triangle: filters in `f64`, and real arithmetic where they are unsure.
 
 use core::cmp::Ordering;
 
 use glam::DVec3;
 
-use crate::math::expansion::sign_of_sum;
+use crate::exact::{self, Quotient};
 use crate::math::rounding::{UNIT, gamma};
-use crate::math::wide;
+use crate::math::{sum_abs, wide};
 use crate::ray::PreparedRay;
 
 /// Where a ray's line meets a triangle.
@@ -21,76 +21,90 @@ pub(crate) struct TriangleHit {
 
 /// The meeting of the ray's line with the closed triangle, whatever its `t`.
 ///
-/// Best effort for this version: signs are those of `f64` arithmetic. They are computed from each
-/// edge's two vertices in a form that only changes its sign when the vertices change places, so a
-/// ray cannot pass between two triangles that share an edge. `t` depends on the set of the three
-/// vertices alone, not on their order, and triangles in one axis-parallel plane get the same `t`.
+/// Exact: hit or miss and the side are those of real arithmetic, for all finite inputs. `t` is within
+/// `t_error`. A ray parallel to the plane misses.
 ///
-/// Weights: `d . (p x q)` for the edge from `p` to `q`, both relative to the origin, as
-/// `d . ((p + q) x (q - p)) / 2`, whose error grows with the edge and not with the distance.
-/// Source: \[DEG12\]; the antisymmetric form is that of Pluecker coordinates.
+/// The sign of `d . (p x q)` says on which side of the edge from `p` to `q`, both relative to the
+/// origin, the line passes. It is computed as `d . ((p + q) x (q - p)) / 2`, whose error grows with
+/// the edge and not with the distance: eight roundings, of products whose sums are at most
+/// `|d| (|p| + |q|) |q - p|` in the norm of absolute sums. What is not larger than that bound is
+/// computed again without error.
+///
+/// Source: \[DEG12\]; filter and exact part after \[She97\].
 pub(crate) fn intersect(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<TriangleHit> {
     let [a, b, c] = triangle.map(wide);
     let o = ray.origin;
     let (ra, rb, rc) = (a - o, b - o, c - o);
+    let (ab, bc, ca) = (b - a, c - b, a - c);
     let edge = |p: DVec3, q: DVec3, pq: DVec3| ray.direction.dot((p + q).cross(pq));
-    let u = edge(rc, ra, a - c);
-    let v = edge(ra, rb, b - a);
-    let w = edge(rb, rc, c - b);
-    let outside = u.min(v).min(w) < 0.0 && u.max(v).max(w) > 0.0;
-    let sum = u + v + w;
-    if outside || sum == 0.0 {
+    let (u, v, w) = (edge(rc, ra, ca), edge(ra, rb, ab), edge(rb, rc, bc));
+    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+    let reach = sum_abs(ra).max(sum_abs(rb)).max(sum_abs(rc));
+    let side = sum_abs(ab).max(sum_abs(bc)).max(sum_abs(ca));
+    let bound = gamma(10) * ray.direction_size * 2.0 * reach * side;
+    if least < -bound && most > bound {
         return None;
     }
+    let sure = least > bound || most < -bound;
+    let [u, v, w] = if sure { [u, v, w] } else { exact_volumes(ray, triangle)? };
     let (t, t_error) = plane(ray, triangle)?;
+    let sum = u + v + w;
     Some(TriangleHit { t, t_error, weights: [u / sum, v / sum], front: sum < 0.0 })
 }
 
+/// The volumes, if all that are not zero have one sign; each within one unit in the last place.
+fn exact_volumes(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<[f64; 3]> {
+    let volumes = exact::volumes(ray, triangle);
+    let has = |sign| volumes.iter().any(|volume| volume.sign() == sign);
+    (has(Ordering::Less) != has(Ordering::Greater)).then(|| volumes.map(|v| v.approximate()))
+}
+
 /// The `t` at which the ray meets the triangle's plane, and a bound on its error.
-fn plane(ray: &PreparedRay, mut triangle: [[f32; 3]; 3]) -> Option<(f64, f64)> {
-    // The same arithmetic for every order of the vertices: least first.
-    let less = |p: &[f32; 3], q: &[f32; 3]| p.partial_cmp(q).unwrap_or(Ordering::Equal);
-    triangle.sort_unstable_by(less);
+fn plane(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<(f64, f64)> {
     let [a, b, c] = triangle.map(wide);
     let (e1, e2) = (b - a, c - a);
     let n = e1.cross(e2);
     let to_plane = a - ray.origin;
-    // In an axis-parallel plane two components are exactly zero, and the third cancels.
-    let axis = (0..3).find(|&k| n[(k + 1) % 3] == 0.0 && n[(k + 2) % 3] == 0.0);
-    if let Some(k) = axis {
-        let t = to_plane[k] / ray.direction[k];
-        return t.is_finite().then_some((t, gamma(3) * t.abs()));
-    }
     let along = ray.direction.dot(n);
+    // Four roundings in `n`, one in `to_plane`, three in either dot product.
+    let size = gamma(8) * sum_abs(e1) * sum_abs(e2);
+    let along_error = ray.direction_size * size;
     let t = to_plane.dot(n) / along;
-    // Each of the two dot products has a relative error of a few units of its largest terms.
-    let size = sum_abs(e1) * sum_abs(e2);
-    let reach = sum_abs(to_plane) + t.abs() * sum_abs(ray.direction);
-    let t_error = 16.0 * UNIT * size * reach / along.abs();
-    t.is_finite().then_some((t, t_error))
+    if 1024.0 * along_error < along.abs() {
+        let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
+        // A hundredth for the divisor's own error, and the rounding of the quotient.
+        return Some((t, 1.01 * t_error + 2.0 * UNIT * t.abs()));
+    }
+    Quotient::new(ray, triangle).approximate()
 }
 
-fn sum_abs(v: DVec3) -> f64 {
-    let v = v.abs();
-    v.x + v.y + v.z
+impl TriangleHit {
+    /// Whether the real `t` is within the ray's limits.
+    pub fn is_within(&self, ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> bool {
+        let (t, e) = (self.t, self.t_error);
+        if t + e < ray.t_min || t - e > ray.t_max {
+            return false;
+        }
+        if t - e > ray.t_min && t + e < ray.t_max {
+            return true;
+        }
+        let t = Quotient::new(ray, triangle);
+        t.compare_with(ray.t_min) != Ordering::Less
+            && t.compare_with(ray.t_max) != Ordering::Greater
+    }
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.
 pub(crate) fn has_area(triangle: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = triangle.map(wide);
     let (e1, e2) = (b - a, c - a);
-    (0..3).any(|k| {
+    let surely = |k: usize| {
         let (i, j) = ((k + 1) % 3, (k + 2) % 3);
         let (p, q) = (e1[i] * e2[j], e1[j] * e2[i]);
         // Three roundings a product and one for the difference.
-        if (p - q).abs() > 2.0 * gamma(4) * (p.abs() + q.abs()) {
-            return true;
-        }
-        // Every product of two floats is exact in f64; `a[i] * a[j]` cancels.
-        let terms =
-            [b[i] * c[j], -(b[i] * a[j]), -(a[i] * c[j]), -(b[j] * c[i]), b[j] * a[i], a[j] * c[i]];
-        sign_of_sum(terms) != Ordering::Equal
-    })
+        (p - q).abs() > 2.0 * gamma(4) * (p.abs() + q.abs())
+    };
+    (0..3).any(surely) || exact::has_area(triangle)
 }
 
 /// The unit normal `(b - a) x (c - a)`, within a few ulp for triangles that are not slivers.
