@@ -89,7 +89,7 @@ impl Candidate {
         let near = self.t as f32;
         let sure = (self.t - self.t_error) as f32 == near && (self.t + self.t_error) as f32 == near;
         match self.triangle {
-            Some(triangle) if !sure => Quotient::new(ray, triangle).round(near),
+            Some(triangle) if !sure => Quotient::new(ray, triangle).round(),
             _ => near,
         }
     }
