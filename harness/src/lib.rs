@@ -1,9 +1,12 @@
 //! What surrounds the core: loaders, scene makers, a renderer, an exact oracle, statistics.
 
+pub mod chart;
 pub mod load;
 pub mod make;
 pub mod model;
 pub mod oracle;
 pub mod rays;
 pub mod render;
+pub mod scenes;
 pub mod shared_scenes;
+pub mod stats;

@@ -87,8 +87,8 @@ impl<'a, T: Tracer> Shader<'a, T> {
             let square = path.length_squared();
             let to_light = path / square.sqrt();
             let cosine = facing.dot(to_light);
-            // Also false for a light exactly on the surface, which makes a NaN.
-            if !(cosine > 0.0) {
+            // A light exactly on the surface makes a NaN, and lights nothing.
+            if cosine <= 0.0 || cosine.is_nan() {
                 continue;
             }
             self.rays.shadow += 1;

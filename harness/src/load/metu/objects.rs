@@ -1,5 +1,6 @@
 //! Meshes, instances of meshes, lone triangles and spheres.
 
+use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
 use glam::{DAffine3, DVec3};
@@ -82,10 +83,11 @@ impl Context<'_> {
         let mut loaded: HashMap<usize, TriangleMesh> = HashMap::new();
         for number in 0..objects.len() {
             let (source, map) = self.resolve(&objects, &ids, number)?;
-            if !loaded.contains_key(&source) {
-                loaded.insert(source, self.faces(objects[source].node)?);
-            }
-            model.meshes.push(moved(&loaded[&source], &map));
+            let mesh = match loaded.entry(source) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => new.insert(self.faces(objects[source].node)?),
+            };
+            model.meshes.push(moved(mesh, &map));
             geometry_material.push(self.material(objects[number].node)?);
         }
         Ok(())
