@@ -1,3 +1,4 @@
 //! What surrounds the core: loaders, scene makers, a renderer, an exact oracle, statistics.
 
+pub mod make;
 pub mod model;
