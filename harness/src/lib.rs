@@ -2,3 +2,5 @@
 
 pub mod make;
 pub mod model;
+pub mod oracle;
+pub mod rays;
