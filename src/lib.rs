@@ -49,6 +49,9 @@ mod accel;
 mod block;
 mod build;
 mod bvh;
+#[cfg(feature = "capi")]
+#[allow(unsafe_code, reason = "C passes pointers, and calls by name")]
+mod capi;
 mod error;
 mod exact;
 mod grid;

@@ -1,0 +1,482 @@
+// raykern: where rays meet triangles and spheres. MIT or Apache-2.0.
+// Written by build.rs from src/capi; edit those.
+//
+// Memory    The library never allocates. `rt_*_needs` says how much a build wants; the caller passes
+//           it in and keeps it. A built accel is one block without pointers: it may be copied,
+//           written to a file or placed in ROM, and opened again. There is nothing to free.
+// Pointers  None may be null unless its comment says so. All are checked for null and alignment.
+// Results   Every call that can fail returns an `RtStatus`. Outputs are written on RT_OK only.
+// Threads   None are started. Calls that take `const RtAccel *` may run at the same time on the same
+//           accel; nobody may write to its block meanwhile.
+// Versions  Most structs begin with `struct_size`; set it to `sizeof` of the struct, outputs
+//           included, and everything you do not use to zero: zero always means the default. A larger
+//           struct than the library knows is accepted while the rest of it is zero.
+// Floats    Rounding modes, flushed subnormal numbers and enabled traps neither change an answer nor
+//           are changed; sticky exception flags may be raised when none of these is in use.
+//
+// RtScene scene = {0};                                Then: memory of `need.size` bytes at a multiple
+// scene.struct_size = sizeof scene;                   of `need.alignment`, and
+// scene.mesh_count = 1;
+// scene.meshes = &mesh;                               const RtAccel *accel;
+// RtMemory need;                                      rt_build_bvh(&scene, NULL, memory, need.size,
+// rt_bvh_needs(&scene, NULL, &need);                               &accel);
+//                                                     RtHit hit;
+//                                                     if (rt_intersect(accel, &ray, &hit)) ...
+
+#ifndef RAYKERN_H
+#define RAYKERN_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+// The version of this header: major, minor and patch, a byte each. `rt_version` says the same of the
+// library.
+#define RT_RAYKERN_VERSION 0x000100u
+
+// "No primitive", "no geometry", "not in an instance".
+#define RT_NONE 0xFFFFFFFFu
+
+// `RtBuildOptions.quality`: binned surface area heuristic.
+#define RT_QUALITY_BALANCED 0
+// For a structure that is built for every frame. Unsupported so far.
+#define RT_QUALITY_FAST 1
+// For a structure that is built once. Unsupported so far.
+#define RT_QUALITY_BEST 2
+
+// `RtBuildOptions.layout`: what suits this machine.
+#define RT_LAYOUT_AUTOMATIC 0
+// Binary nodes of 32 bytes: the least memory.
+#define RT_LAYOUT_COMPACT 1
+// Bundles of 4 boxes. Unsupported so far.
+#define RT_LAYOUT_WIDE_4 4
+// Bundles of 8 boxes. Unsupported so far.
+#define RT_LAYOUT_WIDE_8 8
+// Bundles of 16 boxes. Unsupported so far.
+#define RT_LAYOUT_WIDE_16 16
+
+// `RtBuildOptions.plain_list`: for a handful of primitives, which no structure makes faster.
+#define RT_PLAIN_LIST_AUTOMATIC 0
+// Build the structure even over one primitive.
+#define RT_PLAIN_LIST_NEVER 1
+// Test every ray against every leaf block.
+#define RT_PLAIN_LIST_ALWAYS 2
+
+// `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
+// same answer from every structure. This version decides in doubles: within about 1e-15 of an edge,
+// or of another surface, it may still be wrong. `t` is rounded once.
+#define RT_PRECISION_EXACT 0
+// No ray slips through a closed mesh. Unsupported so far.
+#define RT_PRECISION_WATERTIGHT 1
+
+// `RtQuery.facing`: both sides of every surface.
+#define RT_FACING_BOTH 0
+// Only the side from which a triangle's vertices run counter-clockwise; the outside of spheres.
+#define RT_FACING_FRONT 1
+// Only the other side.
+#define RT_FACING_BACK 2
+
+// `RtInfo.kind`: leaf blocks alone.
+#define RT_KIND_LIST 1
+// A regular grid.
+#define RT_KIND_GRID 2
+// A bounding volume hierarchy.
+#define RT_KIND_BVH 3
+
+// A built structure: the first bytes of a block in the caller's memory.
+typedef struct RtAccel RtAccel;
+
+// Success is zero, everything else says why a call was refused. A number keeps its meaning for
+// ever; `rt_status_message` puts it in words.
+typedef int32_t RtStatus;
+
+// Triangles over vertices.
+typedef struct RtMesh {
+    // x y z of each vertex.
+    const float *vertices;
+    // Three vertex numbers a triangle; or null: then the vertices stand in threes.
+    const uint32_t *indices;
+    uint32_t vertex_count;
+    uint32_t triangle_count;
+    // Bytes from one vertex to the next, a multiple of 4; 0 means 12.
+    uint32_t vertex_stride;
+    // Bytes from one triangle's indices to the next, a multiple of 4; 0 means 12.
+    uint32_t index_stride;
+    // Seen by queries whose mask shares a bit with this one; 0: by all.
+    uint32_t mask;
+    uint32_t reserved;
+} RtMesh;
+
+// Spheres.
+typedef struct RtSphereSet {
+    // x y z radius of each.
+    const float *spheres;
+    uint32_t sphere_count;
+    // Bytes from one sphere to the next, a multiple of 4; 0 means 16.
+    uint32_t sphere_stride;
+    // Seen by queries whose mask shares a bit with this one; 0: by all.
+    uint32_t mask;
+    uint32_t reserved;
+} RtSphereSet;
+
+// A built structure at another place. Unsupported so far.
+typedef struct RtInstance {
+    const RtAccel *accel;
+    // Three rows of four; the last column is the shift.
+    float object_to_world[12];
+    uint32_t mask;
+    uint32_t reserved;
+} RtInstance;
+
+// Everything that can be hit. Geometries are numbered: the meshes first, then the sphere sets.
+//
+// Never hit, though numbered: triangles without area, spheres without a positive radius, and
+// whatever is not finite. `rt_accel_info` counts them.
+typedef struct RtScene {
+    uint32_t struct_size;
+    uint32_t mesh_count;
+    uint32_t sphere_set_count;
+    uint32_t instance_count;
+    // `sizeof(RtMesh)` as the caller compiled it; 0 means as in this library. The next two alike.
+    uint32_t mesh_size;
+    uint32_t sphere_set_size;
+    uint32_t instance_size;
+    uint32_t reserved;
+    // May be null when the count is 0. The next two alike.
+    const RtMesh *meshes;
+    const RtSphereSet *sphere_sets;
+    const RtInstance *instances;
+} RtScene;
+
+// One of the tasks that `parallel_for` runs.
+typedef void (*RtTask)(void *context, uint32_t index);
+
+// The caller's threads: calls `task(context, i)` for each `i` below `count`, in any order and on
+// any thread, and returns when all are done. Tasks never block and never nest.
+typedef void (*RtParallelFor)(void *user, uint32_t count, RtTask task, void *context);
+
+// How far a build is, from 0 to 1; false cancels it. Called on the thread that builds.
+typedef bool (*RtProgress)(void *user, float done);
+
+// What a build may choose. Zero in every field but the first suits most scenes.
+typedef struct RtBuildOptions {
+    uint32_t struct_size;
+    // One of `RT_QUALITY_`.
+    uint32_t quality;
+    // One of `RT_LAYOUT_`, for a BVH.
+    uint32_t layout;
+    // 1: the block can be refitted when vertices move. Unsupported so far.
+    uint32_t refit;
+    // One of `RT_PLAIN_LIST_`.
+    uint32_t plain_list;
+    // How many tasks of `parallel_for` may run at once; without it, ignored.
+    uint32_t worker_count;
+    // Handed to the two calls below.
+    void *user;
+    // Or null. Unsupported so far: with it a build is refused.
+    RtParallelFor parallel_for;
+    // Or null. Unsupported so far: with it a build is refused.
+    RtProgress progress;
+} RtBuildOptions;
+
+// How much memory a build wants, in bytes.
+typedef struct RtMemory {
+    // Enough for all the options ask, scratch included; a multiple of `alignment`.
+    size_t size;
+    // Less is refused; in between, the structure is coarser.
+    size_t minimum;
+    // 64.
+    size_t alignment;
+} RtMemory;
+
+// What a block holds.
+typedef struct RtInfo {
+    uint32_t struct_size;
+    // One of `RT_KIND_`.
+    uint32_t kind;
+    // One of `RT_LAYOUT_`, never automatic.
+    uint32_t layout;
+    // The box around everything that can be hit; `lower > upper` when nothing can.
+    float lower[3];
+    float upper[3];
+    // Triangles that can be hit.
+    uint32_t triangle_count;
+    // Spheres that can be hit.
+    uint32_t sphere_count;
+    uint32_t instance_count;
+    // Triangles and spheres that never are hit: see `RtScene`.
+    uint32_t ignored_count;
+    // Cells along each axis of a grid; 0 in other kinds.
+    uint32_t resolution[3];
+    // Bytes of the block, as from `rt_accel_size`.
+    size_t size;
+    // Bytes of nodes or cells.
+    size_t structure_size;
+    // Bytes of triangles and spheres.
+    size_t leaf_size;
+    // Bytes of primitive numbers.
+    size_t id_size;
+} RtInfo;
+
+// The points `origin + t * direction` with `t_min <= t <= t_max`, both ends included.
+//
+// `direction` need not have length one; `t` counts in its lengths. The limits may be infinite and
+// `t_min` negative. A ray with a NaN or an infinity in `origin` or `direction`, a zero direction, a
+// NaN limit or `t_min > t_max` hits nothing.
+typedef struct RtRay {
+    float origin[3];
+    float t_min;
+    float direction[3];
+    float t_max;
+} RtRay;
+
+// Where a ray meets a scene. After a miss `t` is +infinity, `u` and `v` are 0, the rest RT_NONE.
+typedef struct RtHit {
+    // In lengths of the ray's direction.
+    float t;
+    // The weight of the triangle's second vertex; 0 on spheres.
+    float u;
+    // The weight of the triangle's third vertex; 0 on spheres.
+    float v;
+    // The number of the triangle or sphere within its geometry.
+    uint32_t prim;
+    // The number of the mesh, or `mesh_count` plus the number of the sphere set.
+    uint32_t geometry;
+    // RT_NONE: there are no instances so far.
+    uint32_t instance;
+} RtHit;
+
+// What a query leaves out. Zero in every field but the first leaves out nothing.
+typedef struct RtQuery {
+    uint32_t struct_size;
+    // One of `RT_PRECISION_`.
+    uint32_t precision;
+    // A geometry is seen when its mask and this one share a bit, or when either is 0.
+    uint32_t mask;
+    // One of `RT_FACING_`.
+    uint32_t facing;
+    // 1: leave out the primitive that the next three name, as in an `RtHit`; 0: ignore them. Of a
+    // sphere only the hit nearest to `t = 0` is left out: a ray refracted into it still leaves it.
+    uint32_t skip;
+    uint32_t skip_prim;
+    uint32_t skip_geometry;
+    // RT_NONE outside instances.
+    uint32_t skip_instance;
+} RtQuery;
+
+// The surface at a hit.
+typedef struct RtSurface {
+    uint32_t struct_size;
+    // The point of the hit, rounded.
+    float position[3];
+    // How far `position` may be off the surface, along each axis.
+    float position_error;
+    // Of length one: (v1 - v0) x (v2 - v0), or outward on spheres; never flipped to the ray.
+    float normal[3];
+    // `position` moved off the surface to the side of `normal`: where a reflected ray starts.
+    float front_origin[3];
+    // `position` moved off the surface to the other side.
+    float back_origin[3];
+} RtSurface;
+
+// Done.
+#define RT_OK 0
+
+// A pointer is null that must not be.
+#define RT_ERROR_NULL_POINTER 1
+// A value is outside its range: an option that no constant names, a stride that is too small or no
+// multiple of four, a `struct_size` that is too small, a `reserved` field that is not zero.
+#define RT_ERROR_INVALID_ARGUMENT 2
+// A struct is larger than this library knows, and the part it does not know is not zero.
+#define RT_ERROR_VERSION 3
+// The request is part of this header but not yet of the library.
+#define RT_ERROR_UNSUPPORTED 4
+// A triangle names a vertex that its mesh does not have.
+#define RT_ERROR_INDEX_OUT_OF_RANGE 5
+// The memory is smaller than the `minimum` of `rt_*_needs`.
+#define RT_ERROR_OUT_OF_MEMORY 6
+// A pointer is not aligned: blocks to 64 bytes, everything else as its C type.
+#define RT_ERROR_MISALIGNED 7
+// An array, or the memory a build needs, is larger than this machine can address, or the scene has
+// more primitives than can be numbered.
+#define RT_ERROR_TOO_LARGE 8
+// The bytes do not begin as a block does.
+#define RT_ERROR_NOT_A_BLOCK 9
+// The block was written on a machine of the other byte order.
+#define RT_ERROR_BYTE_ORDER 10
+// The block is of another version of the format.
+#define RT_ERROR_BLOCK_VERSION 11
+// There are fewer bytes than the block has.
+#define RT_ERROR_TRUNCATED 12
+// The block contradicts itself.
+#define RT_ERROR_CORRUPT 13
+// The block has a layout that this build of the library leaves out.
+#define RT_ERROR_LAYOUT 14
+// The ray has no such hit.
+#define RT_ERROR_NOT_FOUND 15
+// A fault of the library, which was stopped before it reached the caller. Please report it.
+#define RT_ERROR_INTERNAL 16
+
+#ifdef __cplusplus
+extern "C" {
+#endif // __cplusplus
+
+// A sentence for `status`, also for numbers that are no status. It need not be freed.
+const char *rt_status_message(RtStatus status);
+
+// The version of the library, in the form of RT_RAYKERN_VERSION.
+uint32_t rt_version(void);
+
+// Writes to `*out` the memory that `rt_build_bvh` needs for `scene`. `options` may be null.
+RtStatus rt_bvh_needs(const RtScene *scene,
+                      const RtBuildOptions *options,
+                      RtMemory *out);
+
+// Writes to `*out` the memory that `rt_build_grid` needs for `scene`. `options` may be null.
+RtStatus rt_grid_needs(const RtScene *scene,
+                       const RtBuildOptions *options,
+                       RtMemory *out);
+
+// Builds a bounding volume hierarchy over `scene` in `memory`, which has `size` bytes and starts at
+// a multiple of 64. `options` may be null.
+//
+// The finished block lies at the front of `memory`, and `*out` is its first byte; what lies behind
+// `rt_accel_size` bytes may be used again. The scene is copied and no longer needed.
+RtStatus rt_build_bvh(const RtScene *scene,
+                      const RtBuildOptions *options,
+                      void *memory,
+                      size_t size,
+                      const RtAccel **out);
+
+// Builds a regular grid: all else as `rt_build_bvh`.
+RtStatus rt_build_grid(const RtScene *scene,
+                       const RtBuildOptions *options,
+                       void *memory,
+                       size_t size,
+                       const RtAccel **out);
+
+// The bytes of the block that begins at `accel`: what to copy or save. 0 for null.
+size_t rt_accel_size(const RtAccel *accel);
+
+// Writes to `*out` what the block holds. `out->struct_size` must be set.
+RtStatus rt_accel_info(const RtAccel *accel, RtInfo *out);
+
+// Opens a block that was built earlier, perhaps elsewhere, after checking it from end to end. It
+// stays where it is, at a multiple of 64 bytes; `size` may be larger than the block.
+//
+// Whatever is accepted can be queried safely; whether it still describes the scene is not known.
+RtStatus rt_accel_open(const void *block, size_t size, const RtAccel **out);
+
+// Writes to `*out` the memory that `rt_accel_pack` needs.
+RtStatus rt_accel_pack_needs(const RtAccel *accel, RtMemory *out);
+
+// Writes the accel, with everything it refers to, as one block into `memory`, which has `size`
+// bytes and starts at a multiple of 64. As long as there are no instances, this is a copy.
+//
+// `memory` may overlap the accel, for example to move it to a tighter place; the old one is then
+// gone.
+RtStatus rt_accel_pack(const RtAccel *accel,
+                       void *memory,
+                       size_t size,
+                       const RtAccel **out);
+
+// The closest hit: the least `t`, and at equal `t` the first by geometry and primitive.
+//
+// Returns whether there is one, and writes it, or the miss, to `*hit`. When a pointer is null:
+// false, and nothing is written.
+bool rt_intersect(const RtAccel *accel, const RtRay *ray, RtHit *hit);
+
+// Whether the ray hits anything: true exactly when `rt_intersect` is. False when a pointer is null.
+bool rt_occluded(const RtAccel *accel, const RtRay *ray);
+
+// `rt_intersect` for what `query` leaves; null leaves everything. When the query is refused, for a
+// reason that `rt_query_check` tells: false, and nothing is written.
+bool rt_intersect_with(const RtAccel *accel,
+                       const RtRay *ray,
+                       const RtQuery *query,
+                       RtHit *hit);
+
+// `rt_occluded` for what `query` leaves; null leaves everything. False when the query is refused.
+bool rt_occluded_with(const RtAccel *accel,
+                      const RtRay *ray,
+                      const RtQuery *query);
+
+// Why a query with these options would be refused, or RT_OK. Null is the default query.
+RtStatus rt_query_check(const RtQuery *query);
+
+// `rt_intersect` for `count` rays. When a pointer is null, nothing is written.
+void rt_intersect_batch(const RtAccel *accel,
+                        const RtRay *rays,
+                        RtHit *hits,
+                        size_t count);
+
+// `rt_occluded` for `count` rays: 1 for a hit, 0 for none. When a pointer is null, nothing is
+// written.
+void rt_occluded_batch(const RtAccel *accel,
+                       const RtRay *rays,
+                       uint8_t *occluded,
+                       size_t count);
+
+// `rt_intersect_with` for `count` rays, `ray_stride` bytes apart, into hits `hit_stride` bytes
+// apart. A stride of 0 means packed; others are multiples of 4 and no less than the struct.
+// `query` may be null. When refused, nothing is written.
+RtStatus rt_intersect_batch_with(const RtAccel *accel,
+                                 const RtRay *rays,
+                                 size_t ray_stride,
+                                 const RtQuery *query,
+                                 RtHit *hits,
+                                 size_t hit_stride,
+                                 size_t count);
+
+// `rt_occluded_with` for `count` rays, `ray_stride` bytes apart, into bytes `occluded_stride` bytes
+// apart. A stride of 0 means packed. `query` may be null. When refused, nothing is written.
+RtStatus rt_occluded_batch_with(const RtAccel *accel,
+                                const RtRay *rays,
+                                size_t ray_stride,
+                                const RtQuery *query,
+                                uint8_t *occluded,
+                                size_t occluded_stride,
+                                size_t count);
+
+// Writes to `*out` the surface at a hit that a query on this accel returned for this ray.
+// `out->struct_size` must be set. Costs about as much as `rt_intersect`.
+RtStatus rt_hit_surface(const RtAccel *accel,
+                        const RtRay *ray,
+                        const RtHit *hit,
+                        RtSurface *out);
+
+#ifdef __cplusplus
+}  // extern "C"
+#endif  // __cplusplus
+
+// The layouts above, checked for the compiler at hand.
+#if defined(__cplusplus)
+#define RT_RAYKERN_ASSERT(name, condition) static_assert(condition, #name)
+#elif defined(__STDC_VERSION__) && __STDC_VERSION__ >= 201112L
+#define RT_RAYKERN_ASSERT(name, condition) _Static_assert(condition, #name)
+#else
+#define RT_RAYKERN_ASSERT(name, condition) typedef char rt_raykern_##name[(condition) ? 1 : -1]
+#endif
+
+RT_RAYKERN_ASSERT(size_of_ray, sizeof(RtRay) == 32);
+RT_RAYKERN_ASSERT(ray_direction, offsetof(RtRay, direction) == 16);
+RT_RAYKERN_ASSERT(size_of_hit, sizeof(RtHit) == 24);
+RT_RAYKERN_ASSERT(hit_prim, offsetof(RtHit, prim) == 12);
+RT_RAYKERN_ASSERT(size_of_mesh, sizeof(RtMesh) == 2 * sizeof(void *) + 24);
+RT_RAYKERN_ASSERT(mesh_vertex_count, offsetof(RtMesh, vertex_count) == 2 * sizeof(void *));
+RT_RAYKERN_ASSERT(size_of_sphere_set, sizeof(RtSphereSet) == sizeof(void *) + 16);
+RT_RAYKERN_ASSERT(size_of_instance, sizeof(RtInstance) == sizeof(void *) + 56);
+RT_RAYKERN_ASSERT(size_of_scene, sizeof(RtScene) == 3 * sizeof(void *) + 32);
+RT_RAYKERN_ASSERT(scene_meshes, offsetof(RtScene, meshes) == 32);
+RT_RAYKERN_ASSERT(size_of_options, sizeof(RtBuildOptions) == 3 * sizeof(void *) + 24);
+RT_RAYKERN_ASSERT(options_user, offsetof(RtBuildOptions, user) == 24);
+RT_RAYKERN_ASSERT(size_of_query, sizeof(RtQuery) == 32);
+RT_RAYKERN_ASSERT(size_of_memory, sizeof(RtMemory) == 3 * sizeof(size_t));
+RT_RAYKERN_ASSERT(size_of_surface, sizeof(RtSurface) == 56);
+RT_RAYKERN_ASSERT(surface_normal, offsetof(RtSurface, normal) == 20);
+RT_RAYKERN_ASSERT(size_of_info, sizeof(RtInfo) == 4 * sizeof(size_t) + 64);
+RT_RAYKERN_ASSERT(info_size, offsetof(RtInfo, size) == 64);
+
+#undef RT_RAYKERN_ASSERT
+
+#endif // RAYKERN_H

@@ -1,0 +1,147 @@
+//! What the calls return: numbers for C, an enum inside.
+
+use core::ffi::{CStr, c_char};
+
+use crate::error::{BuildError, OpenError};
+
+/// Success is zero, everything else says why a call was refused. A number keeps its meaning for
+/// ever; `rt_status_message` puts it in words.
+pub type RtStatus = i32;
+
+/// Done.
+pub const RT_OK: RtStatus = 0;
+/// A pointer is null that must not be.
+pub const RT_ERROR_NULL_POINTER: RtStatus = 1;
+/// A value is outside its range: an option that no constant names, a stride that is too small or no
+/// multiple of four, a `struct_size` that is too small, a `reserved` field that is not zero.
+pub const RT_ERROR_INVALID_ARGUMENT: RtStatus = 2;
+/// A struct is larger than this library knows, and the part it does not know is not zero.
+pub const RT_ERROR_VERSION: RtStatus = 3;
+/// The request is part of this header but not yet of the library.
+pub const RT_ERROR_UNSUPPORTED: RtStatus = 4;
+/// A triangle names a vertex that its mesh does not have.
+pub const RT_ERROR_INDEX_OUT_OF_RANGE: RtStatus = 5;
+/// The memory is smaller than the `minimum` of `rt_*_needs`.
+pub const RT_ERROR_OUT_OF_MEMORY: RtStatus = 6;
+/// A pointer is not aligned: blocks to 64 bytes, everything else as its C type.
+pub const RT_ERROR_MISALIGNED: RtStatus = 7;
+/// An array, or the memory a build needs, is larger than this machine can address, or the scene has
+/// more primitives than can be numbered.
+pub const RT_ERROR_TOO_LARGE: RtStatus = 8;
+/// The bytes do not begin as a block does.
+pub const RT_ERROR_NOT_A_BLOCK: RtStatus = 9;
+/// The block was written on a machine of the other byte order.
+pub const RT_ERROR_BYTE_ORDER: RtStatus = 10;
+/// The block is of another version of the format.
+pub const RT_ERROR_BLOCK_VERSION: RtStatus = 11;
+/// There are fewer bytes than the block has.
+pub const RT_ERROR_TRUNCATED: RtStatus = 12;
+/// The block contradicts itself.
+pub const RT_ERROR_CORRUPT: RtStatus = 13;
+/// The block has a layout that this build of the library leaves out.
+pub const RT_ERROR_LAYOUT: RtStatus = 14;
+/// The ray has no such hit.
+pub const RT_ERROR_NOT_FOUND: RtStatus = 15;
+/// A fault of the library, which was stopped before it reached the caller. Please report it.
+pub const RT_ERROR_INTERNAL: RtStatus = 16;
+
+/// Why a call was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Error {
+    NullPointer,
+    InvalidArgument,
+    Version,
+    Unsupported,
+    IndexOutOfRange,
+    OutOfMemory,
+    Misaligned,
+    TooLarge,
+    NotABlock,
+    ByteOrder,
+    BlockVersion,
+    Truncated,
+    Corrupt,
+    Layout,
+    NotFound,
+    Internal,
+}
+
+impl Error {
+    pub fn status(self) -> RtStatus {
+        match self {
+            Error::NullPointer => RT_ERROR_NULL_POINTER,
+            Error::InvalidArgument => RT_ERROR_INVALID_ARGUMENT,
+            Error::Version => RT_ERROR_VERSION,
+            Error::Unsupported => RT_ERROR_UNSUPPORTED,
+            Error::IndexOutOfRange => RT_ERROR_INDEX_OUT_OF_RANGE,
+            Error::OutOfMemory => RT_ERROR_OUT_OF_MEMORY,
+            Error::Misaligned => RT_ERROR_MISALIGNED,
+            Error::TooLarge => RT_ERROR_TOO_LARGE,
+            Error::NotABlock => RT_ERROR_NOT_A_BLOCK,
+            Error::ByteOrder => RT_ERROR_BYTE_ORDER,
+            Error::BlockVersion => RT_ERROR_BLOCK_VERSION,
+            Error::Truncated => RT_ERROR_TRUNCATED,
+            Error::Corrupt => RT_ERROR_CORRUPT,
+            Error::Layout => RT_ERROR_LAYOUT,
+            Error::NotFound => RT_ERROR_NOT_FOUND,
+            Error::Internal => RT_ERROR_INTERNAL,
+        }
+    }
+}
+
+impl From<BuildError> for Error {
+    fn from(error: BuildError) -> Error {
+        match error {
+            BuildError::IndexOutOfRange { .. } | BuildError::VerticesMissing { .. } => {
+                Error::IndexOutOfRange
+            }
+            BuildError::OutOfMemory { .. } => Error::OutOfMemory,
+            BuildError::Misaligned => Error::Misaligned,
+            BuildError::TooLarge => Error::TooLarge,
+            BuildError::Unsupported(_) => Error::Unsupported,
+        }
+    }
+}
+
+impl From<OpenError> for Error {
+    fn from(error: OpenError) -> Error {
+        match error {
+            OpenError::Misaligned => Error::Misaligned,
+            OpenError::NotABlock => Error::NotABlock,
+            OpenError::ByteOrder => Error::ByteOrder,
+            OpenError::Version => Error::BlockVersion,
+            OpenError::Truncated => Error::Truncated,
+            OpenError::Layout => Error::Layout,
+            OpenError::Corrupt => Error::Corrupt,
+        }
+    }
+}
+
+fn message(status: RtStatus) -> &'static CStr {
+    match status {
+        RT_OK => c"done",
+        RT_ERROR_NULL_POINTER => c"a pointer is null that must not be",
+        RT_ERROR_INVALID_ARGUMENT => c"a value is outside its range",
+        RT_ERROR_VERSION => c"a struct is larger than this library knows",
+        RT_ERROR_UNSUPPORTED => c"this version of the library cannot do that yet",
+        RT_ERROR_INDEX_OUT_OF_RANGE => c"a triangle names a vertex that its mesh does not have",
+        RT_ERROR_OUT_OF_MEMORY => c"the memory is smaller than the minimum",
+        RT_ERROR_MISALIGNED => c"a pointer is not aligned",
+        RT_ERROR_TOO_LARGE => c"the scene is too large to be numbered or stored",
+        RT_ERROR_NOT_A_BLOCK => c"the bytes are not a raykern block",
+        RT_ERROR_BYTE_ORDER => c"the block was written on a machine of the other byte order",
+        RT_ERROR_BLOCK_VERSION => c"the block is of another version of the format",
+        RT_ERROR_TRUNCATED => c"the block is longer than the bytes given",
+        RT_ERROR_CORRUPT => c"the block contradicts itself",
+        RT_ERROR_LAYOUT => c"this build of the library leaves out the block's layout",
+        RT_ERROR_NOT_FOUND => c"the ray has no such hit",
+        RT_ERROR_INTERNAL => c"a fault of the library was stopped",
+        _ => c"an unknown status",
+    }
+}
+
+/// A sentence for `status`, also for numbers that are no status. It need not be freed.
+#[unsafe(no_mangle)]
+pub extern "C" fn rt_status_message(status: RtStatus) -> *const c_char {
+    message(status).as_ptr()
+}
