@@ -138,8 +138,9 @@ impl<'m> Accel<'m> {
     /// The closest hit: of least `t` in real numbers, and of equal ones the first by geometry and
     /// primitive.
     ///
-    /// In this version hits are decided in `f64`: a ray within about 1e-15 of an edge, or two
-    /// surfaces as close to each other, may be decided wrongly. `t` is the nearest float.
+    /// Triangles are decided exactly, as in real arithmetic on the given floats, and `t` is the
+    /// nearest float to the real one. Spheres are decided in `f64` in this version: one that the
+    /// ray touches, or meets next to another surface, within about 1e-15 may be decided wrongly.
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.intersect_with(ray, &QueryOptions::default())
     }
