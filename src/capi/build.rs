@@ -12,10 +12,13 @@ use super::types::{
 };
 use super::versioned::{self, Output, pointer};
 use super::{accel_at, guard};
+use crate::accel::{Accel, Info, Kind};
+use crate::build::{
+    BuildOptions, Layout, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
+};
 use crate::error::BuildError;
 use crate::scene::Scene;
 use crate::storage::ALIGNMENT;
-use crate::{Accel, BuildOptions, Info, Kind, Layout, Memory, PlainList, Quality};
 
 /// Writes to `*out` the memory that `rt_build_bvh` needs for `scene`. `options` may be null.
 ///
@@ -29,7 +32,7 @@ pub unsafe extern "C" fn rt_bvh_needs(
     out: *mut RtMemory,
 ) -> RtStatus {
     // SAFETY: the caller's promise.
-    guard(|| unsafe { needs(scene, options, out, crate::bvh_needs) })
+    guard(|| unsafe { needs(scene, options, out, bvh_needs) })
 }
 
 /// Writes to `*out` the memory that `rt_build_grid` needs for `scene`. `options` may be null.
@@ -44,7 +47,7 @@ pub unsafe extern "C" fn rt_grid_needs(
     out: *mut RtMemory,
 ) -> RtStatus {
     // SAFETY: the caller's promise.
-    guard(|| unsafe { needs(scene, options, out, crate::grid_needs) })
+    guard(|| unsafe { needs(scene, options, out, grid_needs) })
 }
 
 /// Builds a bounding volume hierarchy over `scene` in `memory`, which has `size` bytes and starts at
@@ -66,7 +69,7 @@ pub unsafe extern "C" fn rt_build_bvh(
     out: *mut *const RtAccel,
 ) -> RtStatus {
     // SAFETY: the caller's promise.
-    guard(|| unsafe { build(scene, options, memory.cast(), size, out, crate::build_bvh) })
+    guard(|| unsafe { build(scene, options, memory.cast(), size, out, build_bvh) })
 }
 
 /// Builds a regular grid: all else as `rt_build_bvh`.
@@ -83,7 +86,7 @@ pub unsafe extern "C" fn rt_build_grid(
     out: *mut *const RtAccel,
 ) -> RtStatus {
     // SAFETY: the caller's promise.
-    guard(|| unsafe { build(scene, options, memory.cast(), size, out, crate::build_grid) })
+    guard(|| unsafe { build(scene, options, memory.cast(), size, out, build_grid) })
 }
 
 /// The bytes of the block that begins at `accel`: what to copy or save. 0 for null.
