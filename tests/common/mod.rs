@@ -1,0 +1,75 @@
+//! The three structures over one scene, and answers as bits.
+
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use raykern::{Accel, BuildOptions, Hit, OwnedAccel, PlainList, QueryOptions, Ray, Scene};
+use raykern_harness::make;
+use raykern_harness::model::Model;
+
+/// List, grid and BVH over one scene, each forced.
+pub struct All([(&'static str, OwnedAccel); 3]);
+
+impl All {
+    pub fn build(scene: &Scene) -> Self {
+        let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
+        let never = with(PlainList::Never);
+        All([
+            ("list", OwnedAccel::bvh(scene, &with(PlainList::Always)).expect("a list")),
+            ("grid", OwnedAccel::grid(scene, &never).expect("a grid")),
+            ("bvh", OwnedAccel::bvh(scene, &never).expect("a BVH")),
+        ])
+    }
+
+    pub fn of(model: &Model) -> Self {
+        model.with_scene(Self::build)
+    }
+
+    pub fn accels(&self) -> [(&'static str, Accel<'_>); 3] {
+        [0, 1, 2].map(|i| (self.0[i].0, self.0[i].1.accel()))
+    }
+}
+
+/// All bits of an answer.
+pub fn bits(hit: Option<Hit>) -> Option<[u32; 6]> {
+    let hit = hit?;
+    Some([hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.prim, hit.geometry, hit.instance])
+}
+
+/// The answer on which all agree; panics where they do not.
+pub fn agreed(accels: &[(&str, Accel)], ray: &Ray, options: &QueryOptions) -> Option<Hit> {
+    let (_, first) = &accels[0];
+    let expected = first.intersect_with(ray, options);
+    for (name, accel) in accels {
+        let hit = accel.intersect_with(ray, options);
+        assert_eq!(bits(hit), bits(expected), "{name} {ray:?} {options:?}: {hit:?} {expected:?}");
+        let occluded = accel.occluded_with(ray, options);
+        assert_eq!(occluded, hit.is_some(), "{name} occluded {ray:?} {options:?}");
+    }
+    expected
+}
+
+/// Models with flat, doubled and degenerate triangles, one primitive, and none.
+pub fn odd_models() -> Vec<(&'static str, Model)> {
+    let mut doubled: Model = make::blob(200, 1).into();
+    doubled.meshes.push(doubled.meshes[0].clone());
+    doubled.meshes[0].indices.extend_from_within(..50);
+    let mut degenerate: Model = make::sphere(200).into();
+    let flat: Vec<_> = degenerate.meshes[0].indices.iter().map(|t| [t[0], t[1], t[1]]).collect();
+    degenerate.meshes[0].indices.splice(0..0, flat);
+    degenerate.meshes[0].vertices[7] = [f32::NAN, 0.0, f32::INFINITY];
+    let mut stadium: Model = make::sphere(500).into();
+    stadium.meshes.push(make::plane(50).placed(1e5, [-5e4, -5e4, -1.0]));
+    let mut mixed = make::spheres(100, 2);
+    mixed.sphere_sets.push(vec![[0.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.5, -1.0], [0.5, 0.5, 0.5, 0.3]]);
+    mixed.sphere_sets.push(vec![[0.5, 0.5, 0.5, 0.3], [f32::NAN, 0.0, 0.0, 1.0]]);
+    mixed.meshes.push(make::soup(100, 2));
+    vec![
+        ("none", Model::default()),
+        ("one", make::plane(1).into()),
+        ("flat", make::plane(200).into()),
+        ("doubled", doubled),
+        ("degenerate", degenerate),
+        ("stadium", stadium),
+        ("mixed", mixed),
+    ]
+}
