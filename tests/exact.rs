@@ -49,7 +49,7 @@ fn ordinary_rays_are_answered_exactly() {
 #[test]
 fn hostile_rays_are_counted() {
     /// Families without a wrong answer on these scenes and seeds.
-    const CLEAN: &[Family] = &[];
+    const CLEAN: [Family; 3] = [Family::AxisParallel, Family::Far, Family::OddLength];
     let mut broken = Vec::new();
     println!("{:32} {}", "", Tally::COLUMNS);
     let models = make::ALL.map(|(name, make)| (name, make(1_000)));

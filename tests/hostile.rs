@@ -1,0 +1,115 @@
+//! Rays and scenes that look for trouble, with answers known beforehand.
+
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{All, agreed, odd_models};
+use raykern::{Hit, Mesh, QueryOptions, Ray, Scene, SphereSet};
+use raykern_harness::make;
+use raykern_harness::model::Model;
+use raykern_harness::rays::{Family, RayMaker};
+
+const ALL: QueryOptions = QueryOptions { mask: 0, facing: raykern::Facing::Both, skip: None };
+const DOWN: [f32; 3] = [0.0, 0.0, -1.0];
+
+fn ask(all: &All, ray: Ray) -> Option<Hit> {
+    agreed(&all.accels(), &ray, &ALL)
+}
+
+#[test]
+fn invalid_rays_hit_nothing() {
+    for (name, model) in odd_models() {
+        let all = All::of(&model);
+        for ray in RayMaker::new(&model, 1).many(Family::Invalid, 1_000) {
+            assert_eq!(ask(&all, ray), None, "{name} {ray:?}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_hit_where_nothing_is() {
+    let all = All::build(&Scene::new(&[], &[]));
+    assert_eq!(ask(&all, Ray::new([0.0; 3], DOWN)), None);
+    let flat = [[[0.0; 3]; 3], [[0.0; 3], [1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]];
+    let broken = [[f32::NAN, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, -1.0], [0.0; 4]];
+    let (meshes, sets) = ([Mesh::soup(&flat)], [SphereSet::new(&broken)]);
+    let all = All::build(&Scene::new(&meshes, &sets));
+    for (name, accel) in all.accels() {
+        assert_eq!(accel.info().ignored_count, 5, "{name}");
+    }
+    assert_eq!(ask(&all, Ray::new([0.0, 0.0, 3.0], DOWN)), None);
+    assert_eq!(ask(&all, Ray::new([-1.0; 3], [1.0; 3])), None);
+}
+
+#[test]
+fn one_triangle_at_every_scale() {
+    for power in (-147..=120).step_by(3) {
+        // Powers of two, so that the answers are exact: 1e-44 to 1e36.
+        let s = f32::from_bits(1).max(2f64.powi(power) as f32);
+        let mesh = [[[0.0; 3], [4.0 * s, 0.0, 0.0], [0.0, 4.0 * s, 0.0]]];
+        let meshes = [Mesh::soup(&mesh)];
+        let all = All::build(&Scene::new(&meshes, &[]));
+        let hit = ask(&all, Ray::new([s, s, 2.0 * s], [0.0, 0.0, -s])).expect("a hit");
+        assert_eq!((hit.t, hit.u, hit.v), (2.0, 0.25, 0.25), "2^{power}");
+        let beside = Ray::new([3.0 * s, 3.0 * s, 2.0 * s], [0.0, 0.0, -s]);
+        assert_eq!(ask(&all, beside), None, "2^{power}");
+    }
+}
+
+#[test]
+fn edges_vertices_and_planes_of_a_square() {
+    let vertices = [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+    let meshes = [Mesh::indexed(&vertices, &[[0, 1, 2], [0, 2, 3]])];
+    let all = All::build(&Scene::new(&meshes, &[]));
+    for (x, y, prim) in
+        [(0.0, 0.0, 0), (1.0, 0.0, 0), (1.0, 1.0, 0), (0.0, 1.0, 1), (0.5, 0.5, 0), (0.0, 0.5, 1)]
+    {
+        let hit = ask(&all, Ray::new([x, y, 1.0], DOWN)).expect("the boundary belongs to it");
+        assert_eq!((hit.prim, hit.t), (prim, 1.0), "{x} {y}");
+    }
+    for direction in [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, -0.0, 0.0]] {
+        assert_eq!(ask(&all, Ray::new([0.5, 0.5, 0.0], direction)), None, "{direction:?}");
+    }
+    let behind = Ray::new([0.5, 0.25, -1.0], DOWN);
+    assert_eq!(ask(&all, behind), None);
+    let hit = ask(&all, behind.with_limits(-2.0, 0.0)).expect("negative limits are honoured");
+    assert_eq!(hit.t, -1.0);
+    assert_eq!(ask(&all, behind.with_limits(0.0, -2.0)), None);
+}
+
+#[test]
+fn equal_hits_go_to_the_first_in_order() {
+    let triangle = [[[0.0; 3], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]]; 40];
+    let meshes = [Mesh::soup(&triangle[..0]), Mesh::soup(&triangle), Mesh::soup(&triangle)];
+    let all = All::build(&Scene::new(&meshes, &[]));
+    let hit = ask(&all, Ray::new([1.0, 1.0, 1.0], DOWN)).expect("a hit");
+    assert_eq!((hit.geometry, hit.prim), (1, 0));
+}
+
+#[test]
+fn a_teapot_in_a_stadium() {
+    let mut model: Model = make::sphere(2_000).into();
+    model.meshes.push(make::plane(200).placed(1e6, [-5e5, -5e5, -2.0]));
+    let all = All::of(&model);
+    let down = |x: f32, y: f32| ask(&all, Ray::new([x, y, 4.0], DOWN)).map(|hit| hit.geometry);
+    assert_eq!(down(0.1, 0.2), Some(0));
+    assert_eq!(down(1.1, 0.2), Some(1));
+    assert_eq!(down(4e5, -4e5), Some(1));
+    assert_eq!(down(6e5, 0.0), None);
+}
+
+/// No panic, no hang, and agreement: all families over odd scenes at extreme scales.
+#[test]
+fn extreme_scales() {
+    for power in [-140, -100, -30, 30, 100, 120] {
+        let s = 2f64.powi(power);
+        let model: Model = make::soup(100, 3).placed(s, [s, -s, 0.0]).into();
+        let all = All::of(&model);
+        for family in Family::HOSTILE {
+            for ray in RayMaker::new(&model, 2).many(family, 100) {
+                ask(&all, ray);
+            }
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! The caller's memory: enough is enough, less is refused, and a block is its bytes.
+
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{bits, odd_models};
+use raykern::{Accel, BuildError, BuildOptions, Memory, OpenError, PlainList, Scene};
+use raykern_harness::make::{self, Random};
+use raykern_harness::model::Model;
+use raykern_harness::rays::{Family, RayMaker};
+use std::mem::MaybeUninit;
+
+type Needs = fn(&Scene, &BuildOptions) -> Result<Memory, BuildError>;
+type Build =
+    for<'m> fn(&Scene, &BuildOptions, &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError>;
+
+const STRUCTURES: [(&str, Needs, Build); 2] = [
+    ("grid", raykern::grid_needs, raykern::build_grid),
+    ("bvh", raykern::bvh_needs, raykern::build_bvh),
+];
+
+const FORCED: BuildOptions = BuildOptions {
+    quality: raykern::Quality::Balanced,
+    layout: raykern::Layout::Automatic,
+    refit: false,
+    plain_list: PlainList::Never,
+};
+
+/// `size` bytes from a multiple of 64 plus `shift`, filled with a pattern.
+fn with_memory<R>(size: usize, shift: usize, f: impl FnOnce(&mut [MaybeUninit<u8>]) -> R) -> R {
+    let mut memory = vec![MaybeUninit::new(0xa5u8); size + shift + 64];
+    let start = memory.as_ptr().align_offset(64) + shift;
+    f(&mut memory[start..start + size])
+}
+
+fn with_copy<R>(bytes: &[u8], f: impl FnOnce(&mut [u8]) -> R) -> R {
+    let mut memory = vec![0u8; bytes.len() + 64];
+    let start = memory.as_ptr().align_offset(64);
+    let place = &mut memory[start..start + bytes.len()];
+    place.copy_from_slice(bytes);
+    f(place)
+}
+
+fn models() -> Vec<(&'static str, Model)> {
+    let made = make::ALL.map(|(name, make)| (name, make(500)));
+    odd_models().into_iter().chain(made).collect()
+}
+
+fn block(model: &Model, needs: Needs, build: Build) -> Vec<u8> {
+    model.with_scene(|scene| {
+        let size = needs(scene, &FORCED).expect("a size").size;
+        with_memory(size, 0, |m| build(scene, &FORCED, m).expect("enough").block().to_vec())
+    })
+}
+
+#[test]
+fn what_is_needed_is_enough_and_less_than_the_minimum_is_refused() {
+    for (name, model) in models() {
+        for (structure, needs, build) in STRUCTURES {
+            model.with_scene(|scene| {
+                let Memory { size, minimum, alignment } = needs(scene, &FORCED).expect("a size");
+                assert!(minimum <= size && alignment == 64, "{name} {structure}");
+                for enough in [size, minimum] {
+                    let built = with_memory(enough, 0, |m| build(scene, &FORCED, m).map(|_| ()));
+                    assert_eq!(built, Ok(()), "{name} {structure} {enough}");
+                }
+                let untouched = |m: &[MaybeUninit<u8>]| {
+                    // SAFETY: `with_memory` has written every byte.
+                    #[allow(unsafe_code, reason = "looks at bytes that are initialised")]
+                    m.iter().all(|b| unsafe { b.assume_init() } == 0xa5)
+                };
+                with_memory(minimum - 1, 0, |m| {
+                    let built = build(scene, &FORCED, m).map(|_| ());
+                    assert_eq!(built, Err(BuildError::OutOfMemory { minimum }), "{name}");
+                    assert!(untouched(m), "{name} {structure}");
+                });
+                with_memory(size, 4, |m| {
+                    let built = build(scene, &FORCED, m).map(|_| ());
+                    assert_eq!(built, Err(BuildError::Misaligned), "{name}");
+                    assert!(untouched(m), "{name} {structure}");
+                });
+            });
+        }
+    }
+}
+
+#[test]
+fn equal_builds_give_equal_bytes_and_a_copy_gives_equal_answers() {
+    for (name, model) in models() {
+        for (structure, needs, build) in STRUCTURES {
+            let first = block(&model, needs, build);
+            assert_eq!(first, block(&model, needs, build), "{name} {structure}");
+            with_copy(&first, |a| {
+                with_copy(&first, |b| {
+                    let (a, b) = (Accel::open(a).expect("sound"), Accel::open(b).expect("sound"));
+                    for ray in RayMaker::new(&model, 1).many(Family::Random, 200) {
+                        assert_eq!(bits(a.intersect(&ray)), bits(b.intersect(&ray)), "{name}");
+                    }
+                });
+            });
+        }
+    }
+}
+
+#[test]
+fn broken_blocks_are_refused_or_harmless() {
+    let mut random = Random::new(9);
+    let (mut refused, mut opened) = (0, 0);
+    for (name, model) in models() {
+        let rays = RayMaker::new(&model, 1).many(Family::Random, 20);
+        for (_, needs, build) in STRUCTURES {
+            let good = block(&model, needs, build);
+            for cut in [0, 1, 63, 64, good.len() / 2, good.len() - 1] {
+                with_copy(&good[..cut.min(good.len() - 1)], |m| {
+                    assert!(Accel::open(m).is_err(), "{name} cut to {cut}");
+                });
+            }
+            with_copy(&[&good[..], &[0; 64]].concat(), |m| {
+                assert_eq!(Accel::open(&m[1..]).err(), Some(OpenError::Misaligned), "{name}");
+            });
+            for _ in 0..200 {
+                with_copy(&good, |m| {
+                    // Half the changes go to the first bytes, where the sizes stand.
+                    let reach = if random.below(2) == 0 { m.len().min(256) } else { m.len() };
+                    for _ in 0..=random.below(3) {
+                        let at = random.below(reach);
+                        match random.below(3) {
+                            0 => m[at] ^= 1 << random.below(8),
+                            1 => m[at] = 0xff,
+                            _ => m[at] = random.bits() as u8,
+                        }
+                    }
+                    match Accel::open(m) {
+                        Err(_) => refused += 1,
+                        Ok(accel) => {
+                            opened += 1;
+                            for ray in &rays {
+                                let hit = accel.intersect(ray);
+                                accel.occluded(ray);
+                                hit.map(|hit| accel.surface(ray, &hit));
+                            }
+                        }
+                    }
+                });
+            }
+        }
+    }
+    assert!(refused > 500 && opened > 500, "{refused} refused, {opened} opened");
+}
