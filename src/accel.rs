@@ -253,7 +253,8 @@ impl<'m> Accel<'m> {
 /// The weights of the second and third vertex as floats, such that neither they nor `1 - u - v` are
 /// negative: each is the nearest float to its value in `f64`, and `v` gives way.
 fn rounded_weights([u, v]: [f64; 2]) -> [f32; 2] {
-    let u = (u as f32).clamp(0.0, 1.0) + 0.0;
-    let v = (v as f32).clamp(0.0, 1.0 - u) + 0.0;
+    // `max` and `min` drop a NaN, which only a block of foreign bytes gives; `clamp` would panic.
+    let u = (u as f32).max(0.0).min(1.0) + 0.0;
+    let v = (v as f32).max(0.0).min(1.0 - u) + 0.0;
     [u, v]
 }
