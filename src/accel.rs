@@ -252,8 +252,8 @@ impl<'m> Accel<'m> {
 
 /// The weights of the second and third vertex as floats, such that neither they nor `1 - u - v` are
 /// negative: each is the nearest float to its value in `f64`, and `v` gives way.
+#[expect(clippy::manual_clamp, reason = "`clamp` panics on the NaN that foreign blocks can give")]
 fn rounded_weights([u, v]: [f64; 2]) -> [f32; 2] {
-    // `max` and `min` drop a NaN, which only a block of foreign bytes gives; `clamp` would panic.
     let u = (u as f32).max(0.0).min(1.0) + 0.0;
     let v = (v as f32).max(0.0).min(1.0 - u) + 0.0;
     [u, v]
