@@ -1,0 +1,60 @@
+//! Grid against BVH: the table of the blog post "Ray Tracing From Scratch: Grid & BVH Comparison".
+//!
+//! ```text
+//! cargo run --release --example compare
+//! cargo run --release --example compare -- --scene bunny --runs 5 --size 0.5
+//! ```
+//!
+//! Renders each scene several times with each structure, on one thread, the structures taking
+//! turns, and writes pictures, tables (CSV) and a chart (SVG). Without the collected scenes it
+//! takes those that are built in. What does not fit the time budget is shortened, and said so.
+
+mod measure;
+mod options;
+mod plan;
+mod report;
+mod subjects;
+
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use clap::Parser;
+use raykern_harness::shared_scenes;
+
+use crate::options::Options;
+use crate::report::Report;
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<()> {
+    let start = Instant::now();
+    let folder = shared_scenes::folder(options.scenes.as_deref());
+    if let (Some(chosen), None) = (&options.scenes, &folder) {
+        anyhow::bail!("--scenes {}: no such folder", chosen.display());
+    }
+    if options.list_scenes {
+        subjects::list(folder.as_deref());
+        return Ok(());
+    }
+    let subjects = subjects::choose(&options.scene, folder.as_deref())?;
+    let mut report = Report::create(&options.out)?;
+    println!("{}", report::preamble(options, folder.as_deref()));
+    let budget = Duration::from_secs(options.budget);
+    for (number, subject) in subjects.iter().enumerate() {
+        let left = budget.saturating_sub(start.elapsed());
+        let share = left / (subjects.len() - number) as u32;
+        let measured = measure::scene(subject, options, Instant::now() + share)
+            .with_context(|| format!("scene {}", subject.name))?;
+        report.add(measured)?;
+    }
+    report.finish(start.elapsed())
+}
