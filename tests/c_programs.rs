@@ -1,0 +1,174 @@
+//! Compiles the programs in `c_tests/` against the header and the static library, and runs them.
+//!
+//! With `RAYKERN_SANITIZE=1` the programs are compiled with address and undefined-behaviour
+//! sanitizers; the Rust side is not.
+
+#![cfg(all(unix, not(miri)))]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+const WARNINGS: [&str; 4] = ["-pedantic", "-Wall", "-Wextra", "-Werror"];
+const SYSTEM: [&str; 3] = ["-lpthread", "-lm", "-ldl"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A directory of its own, so that the nested cargo does not wait for the one that runs the test.
+fn target() -> PathBuf {
+    root().join("target/c-tests")
+}
+
+/// Runs `command`, which must succeed; returns what it printed.
+fn run(command: &mut Command) -> String {
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {}\n{errors}", output.status);
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn cargo() -> Command {
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.current_dir(root()).env("CARGO_TARGET_DIR", target()).arg("--offline");
+    cargo
+}
+
+/// The folder of the C library, which is built once.
+fn library() -> &'static Path {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(|| {
+        run(cargo().args(["build", "-p", "raykern-c"]));
+        target().join("debug")
+    })
+}
+
+fn compiler(cpp: bool) -> Command {
+    let host = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
+    let mut build = cc::Build::new();
+    build.cpp(cpp).target(&host).host(&host).opt_level(1).cargo_metadata(false);
+    build.out_dir(target()).get_compiler().to_command()
+}
+
+/// Compiles `source` with `flags`, links it and runs it.
+fn program(name: &str, source: &str, cpp: bool, flags: &[&str]) {
+    let library = library().join("libraykern.a");
+    let binary = target().join(name);
+    let mut command = compiler(cpp);
+    command.args(flags).args(WARNINGS).arg("-I").arg(root().join("include"));
+    if std::env::var_os("RAYKERN_SANITIZE").is_some() {
+        command.args(["-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]);
+    }
+    let language = if cpp { "c++" } else { "c" };
+    command.args(["-x", language]).arg(root().join(source)).args(["-x", "none"]);
+    run(command.arg(library).args(SYSTEM).arg("-o").arg(&binary));
+    // Memory of the programs is never freed.
+    run(Command::new(binary).env("ASAN_OPTIONS", "detect_leaks=0"));
+}
+
+#[test]
+fn abi() {
+    program("abi99", "c_tests/abi.c", false, &["-std=c99"]);
+    program("abi11", "c_tests/abi.c", false, &["-std=c11"]);
+    program("abi++", "c_tests/abi.c", true, &["-std=c++11"]);
+}
+
+#[test]
+fn layout() {
+    program("layout", "c_tests/layout.c", false, &["-std=c11"]);
+}
+
+#[test]
+fn errors() {
+    program("errors", "c_tests/errors.c", false, &["-std=c11"]);
+}
+
+#[test]
+fn memory() {
+    program("memory", "c_tests/memory.c", false, &["-std=c11"]);
+}
+
+#[test]
+fn threads() {
+    program("threads", "c_tests/threads.c", false, &["-std=c11"]);
+}
+
+#[test]
+fn control() {
+    program("control", "c_tests/control.c", false, &["-std=c11", "-frounding-math"]);
+}
+
+#[test]
+fn first_ray() {
+    program("first_ray", "examples/first_ray.c", false, &["-std=c11"]);
+}
+
+#[test]
+fn the_shared_library_exports_only_its_own_names() {
+    let symbols = run(Command::new("nm")
+        .args(["-D", "--defined-only", "-P"])
+        .arg(library().join("libraykern.so")));
+    let names: Vec<&str> = symbols.lines().filter_map(|line| line.split(' ').next()).collect();
+    assert!(names.contains(&"rt_intersect"), "{names:?}");
+    assert!(names.iter().all(|name| name.starts_with("rt_")), "{names:?}");
+}
+
+#[test]
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn freestanding() {
+    let features = ["--no-default-features", "--features", "freestanding"];
+    run(cargo()
+        .args(["rustc", "-p", "raykern-c", "--profile", "freestanding"])
+        .args(features)
+        .args(["--crate-type", "staticlib"]));
+    let binary = target().join("freestanding-program");
+    let mut command = compiler(false);
+    command.args(["-std=c11", "-ffreestanding", "-fno-builtin", "-fno-stack-protector"]);
+    command.args(["-nostdlib", "-nostartfiles", "-static", "-no-pie", "-Wl,--gc-sections"]);
+    command.args(WARNINGS).arg("-I").arg(root().join("include"));
+    command.arg(root().join("c_tests/freestanding.c"));
+    command.arg(target().join("freestanding/libraykern.a")).arg("-o").arg(&binary);
+    run(&mut command);
+    run(&mut Command::new(binary));
+}
+
+/// The example against an installed copy, as a user would build it.
+#[test]
+fn install() {
+    let prefix = target().join("installed");
+    let make = |goal: &str| {
+        let mut make = Command::new("make");
+        make.current_dir(root()).env("CARGO_TARGET_DIR", target()).arg(goal);
+        run(make.arg(format!("PREFIX={}", prefix.display())).env("CARGO_NET_OFFLINE", "true"));
+    };
+    make("install");
+    let pc = std::fs::read_to_string(prefix.join("lib/pkgconfig/raykern.pc")).unwrap();
+    let value = |key: &str| -> Vec<String> {
+        let line = pc.lines().find_map(|line| line.strip_prefix(key)).expect(key);
+        let line = line.replace("${includedir}", &format!("{}/include", prefix.display()));
+        let line = line.replace("${libdir}", &format!("{}/lib", prefix.display()));
+        line.split_whitespace().map(str::to_owned).collect()
+    };
+    let source = root().join("examples/first_ray.c");
+    let (shared, fixed) = (target().join("installed-shared"), target().join("installed-static"));
+    run(compiler(false)
+        .args(value("Cflags:"))
+        .arg(&source)
+        .args(value("Libs:"))
+        .arg("-o")
+        .arg(&shared));
+    run(Command::new(&shared).env("LD_LIBRARY_PATH", prefix.join("lib")));
+    let archive = prefix.join("lib/libraykern.a");
+    run(compiler(false)
+        .args(value("Cflags:"))
+        .arg(&source)
+        .arg(archive)
+        .args(value("Libs.private:"))
+        .arg("-o")
+        .arg(&fixed));
+    run(&mut Command::new(&fixed));
+    make("uninstall");
+    assert!(!prefix.join("include/raykern.h").exists());
+    assert!(std::fs::read_dir(prefix.join("lib")).unwrap().all(|e| e.unwrap().path().is_dir()));
+}
