@@ -174,10 +174,10 @@ fn sort_along_a_curve(items: &mut [(Place, Shape)]) {
     items.sort_by_cached_key(|(_, shape)| {
         let p = middle(shape);
         let cell: [u64; 3] = std::array::from_fn(|k| {
-            (1023.0 * (p[k] - lower[k]) / (upper[k] - lower[k]).max(1e-300)) as u64
+            (2_097_151.0 * (p[k] - lower[k]) / (upper[k] - lower[k]).max(1e-300)) as u64
         });
         let bit = |i: usize| cell[i % 3] >> (i / 3) & 1;
-        (0..30).fold(0, |key, i| key | bit(i) << i)
+        (0..63).fold(0, |key, i| key | bit(i) << i)
     });
 }
 
