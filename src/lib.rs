@@ -45,6 +45,11 @@ extern crate std;
 #[cfg(not(any(feature = "std", feature = "libm")))]
 compile_error!("raykern needs square roots: enable the feature `std` or the feature `libm`");
 
+/// The examples of the README, compiled.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod accel;
 mod block;
 mod build;
