@@ -5,8 +5,8 @@
 mod common;
 
 use common::{All, odd_models};
-use raykern::QueryOptions;
-use raykern_harness::make;
+use raykern::{Facing, Hit, Mesh, NONE, PrimId, QueryOptions, Scene, SphereSet};
+use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
 use raykern_harness::rays::{Family, RayMaker};
@@ -58,4 +58,39 @@ fn hostile_rays_are_answered_exactly() {
         }
     }
     assert_eq!(wrong, 0);
+}
+
+/// Masks, sides and skipped primitives, over meshes and spheres that are doubled in part.
+#[test]
+fn options_are_answered_exactly() {
+    const MASKS: [u32; 4] = [1, 2, 0, 3];
+    let mut model: Model = make::blob(300, 6).into();
+    model.meshes.push(model.meshes[0].clone());
+    model.sphere_sets.push(vec![[0.0, 0.0, 0.0, 1.0], [0.5, 0.0, 0.0, 0.75]]);
+    model.sphere_sets.push(vec![[0.0, 0.0, 0.0, 1.0], [-0.5, 0.25, 0.0, 1.0]]);
+    let meshes: Vec<_> = (model.meshes.iter().zip(MASKS))
+        .map(|(mesh, mask)| Mesh::indexed(&mesh.vertices, &mesh.indices).with_mask(mask))
+        .collect();
+    let sets: Vec<_> = (model.sphere_sets.iter().zip(&MASKS[2..]))
+        .map(|(set, mask)| SphereSet::new(set).with_mask(*mask))
+        .collect();
+    let all = All::build(&Scene::new(&meshes, &sets));
+    let oracle = Oracle::with_masks(&model, &MASKS);
+    let (mut random, mut hits) = (Random::new(5), 0);
+    for family in [Family::Random, Family::Inside, Family::FromSurface, Family::Limited] {
+        for ray in RayMaker::new(&model, 7).many(family, 1_000) {
+            let facing = [Facing::Both, Facing::Front, Facing::Back][random.below(3)];
+            let mask = random.below(4) as u32;
+            let first = common::agreed(&all.accels(), &ray, &QueryOptions::default());
+            let skip = first.filter(|_| random.below(2) == 0);
+            let skip =
+                skip.map(|Hit { prim, geometry, .. }| PrimId { prim, geometry, instance: NONE });
+            let options = QueryOptions { mask, facing, skip };
+            let hit = common::agreed(&all.accels(), &ray, &options);
+            let judgement = oracle.judge(&ray, &options, hit);
+            assert_eq!(judgement, Judgement::Right, "{ray:?} {options:?} {hit:?}");
+            hits += usize::from(hit.is_some());
+        }
+    }
+    assert!(hits > 1_000, "{hits}");
 }
