@@ -5,7 +5,7 @@
 mod common;
 
 use common::{All, agreed, odd_models};
-use raykern::{Hit, Mesh, QueryOptions, Ray, Scene, SphereSet};
+use raykern::{Facing, Hit, Mesh, NONE, PrimId, QueryOptions, Ray, Scene, SphereSet};
 use raykern_harness::make;
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
@@ -111,5 +111,21 @@ fn extreme_scales() {
                 ask(&all, ray);
             }
         }
+    }
+}
+
+#[test]
+fn a_tangent_has_two_sides_and_is_skipped_whole() {
+    let model = Model { meshes: vec![], sphere_sets: vec![vec![[0.0, 0.0, -5.0, 1.0]]] };
+    let all = All::of(&model);
+    let ray = Ray::new([1.0, 0.0, 0.0], [0.0, 0.0, -1.0]);
+    let skip = Some(PrimId { prim: 0, geometry: 0, instance: NONE });
+    for (_, accel) in all.accels() {
+        for facing in [Facing::Both, Facing::Front, Facing::Back] {
+            let options = QueryOptions { facing, ..Default::default() };
+            assert_eq!(accel.intersect_with(&ray, &options).map(|hit| hit.t), Some(5.0));
+        }
+        let options = QueryOptions { skip, ..Default::default() };
+        assert_eq!(accel.intersect_with(&ray, &options), None);
     }
 }

@@ -108,3 +108,21 @@ fn flipped_windings_change_sides_and_nothing_else() {
         }
     }
 }
+
+#[test]
+fn batches_are_single_calls() {
+    let model = blob();
+    let all = All::of(&model);
+    let rays = RayMaker::new(&model, 3).many(Family::Random, 1_000);
+    for (_, accel) in all.accels() {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        let mut occluded = vec![false; rays.len()];
+        accel.intersect_batch(&rays, &mut hits);
+        accel.occluded_batch(&rays, &mut occluded);
+        for ((ray, hit), occluded) in rays.iter().zip(hits).zip(occluded) {
+            let single = accel.intersect(ray);
+            assert_eq!(bits(Some(hit)), bits(Some(single.unwrap_or(Hit::MISS))), "{ray:?}");
+            assert_eq!(occluded, single.is_some(), "{ray:?}");
+        }
+    }
+}

@@ -42,3 +42,61 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::block::leaf::TriangleBlock;
+    use crate::math::Aabb;
+
+    const LEAF: BvhNode = BvhNode { lower: [0.0; 3], first: 1 << 30, upper: [1.0; 3], lanes: 1 };
+
+    fn inner(first: u32) -> BvhNode {
+        BvhNode::inner(&Aabb { lower: [0.0; 3], upper: [1.0; 3] }, first)
+    }
+
+    fn is_sound(nodes: &[BvhNode]) -> bool {
+        let block = TriangleBlock { count: 1, ..TriangleBlock::EMPTY };
+        let leaves = Leaves { triangle_blocks: &[block], sphere_blocks: &[], prim_ids: &[0] };
+        tree_is_sound(nodes, &leaves)
+    }
+
+    #[test]
+    fn trees_are_told_from_other_graphs() {
+        let unused = inner(0);
+        assert!(is_sound(&[LEAF, unused]));
+        assert!(is_sound(&[inner(2), unused, LEAF, inner(4), LEAF, LEAF]));
+        assert!(!is_sound(&[]), "no root");
+        assert!(!is_sound(&[inner(0), unused]), "a node that is its own child");
+        assert!(!is_sound(&[inner(2), unused, inner(2), LEAF]), "a pair that is its own parent");
+        let shared = [inner(2), unused, inner(4), inner(4), LEAF, LEAF];
+        assert!(!is_sound(&shared), "a pair with two parents");
+        assert!(!is_sound(&[inner(2), unused, LEAF]), "half a pair");
+        assert!(!is_sound(&[inner(2), unused, LEAF, LEAF, LEAF, LEAF]), "nodes without a parent");
+        assert!(!is_sound(&[inner(4), unused, LEAF, LEAF, LEAF, LEAF]), "a gap");
+    }
+
+    #[test]
+    fn leaves_must_exist() {
+        let unused = inner(0);
+        for (first, lanes) in
+            [(1 << 30, 2), (1 << 30 | 1, 1), (2 << 30, 1), (0, 1), (1 << 30, 1 << 16)]
+        {
+            assert!(!is_sound(&[BvhNode { first, lanes, ..LEAF }, unused]), "{first:x} {lanes:x}");
+        }
+    }
+
+    #[test]
+    fn what_is_deeper_than_the_stack_is_refused() {
+        let chain = |depth: u32| {
+            let mut nodes = std::vec![inner(2), inner(0)];
+            for level in 1..depth {
+                nodes.extend([inner(2 * level + 2), LEAF]);
+            }
+            nodes.extend([LEAF, LEAF]);
+            nodes
+        };
+        assert!(is_sound(&chain(MAX_DEPTH as u32)));
+        assert!(!is_sound(&chain(MAX_DEPTH as u32 + 1)));
+    }
+}

@@ -115,6 +115,8 @@ impl Leaves<'_> {
             let (centre, radius) = block.sphere(lane);
             let Some(roots) = sphere::intersect(ray, centre, radius) else { return false };
             let nearest = usize::from(roots.t[1].abs() < roots.t[0].abs());
+            // A line that only touches the sphere meets its front and its back in one point.
+            let touches = roots.t[0] == roots.t[1];
             (0..2).any(|root| {
                 ray.holds(roots.t[root])
                     && query.accept(&Candidate {
@@ -125,7 +127,7 @@ impl Leaves<'_> {
                         prim: self.prim_id(block.first, lane),
                         place: (number as u32, lane as u32),
                         front: root == 0,
-                        skippable: root == nearest,
+                        skippable: touches || root == nearest,
                     })
             })
         })
