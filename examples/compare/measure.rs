@@ -80,6 +80,9 @@ impl MeasuredStructure {
     }
 }
 
+/// However late it is, a run may take this long.
+const LEAST_RUN: Duration = Duration::from_secs(2);
+
 /// A scene with its structures, ready to be measured.
 struct Bench<'a> {
     scene: &'a RenderScene,
@@ -127,7 +130,7 @@ pub fn scene(subject: &Subject, options: &Options, deadline: Instant) -> Result<
     };
     bench.count(&mut measured, deadline);
     let plan = bench.pilot(options.runs, deadline);
-    bench.rounds(&plan, &mut measured, &options.out)?;
+    bench.rounds(&plan, &mut measured, deadline, &options.out)?;
     measured.note_plan(&plan, options.runs);
     Ok(measured)
 }
@@ -182,12 +185,25 @@ impl Bench<'_> {
         plan(&seconds, self.camera.pixel_count(), runs, share)
     }
 
-    fn rounds(&self, plan: &Plan, measured: &mut Measured, out: &Path) -> Result<()> {
+    /// Measures as planned. Past the deadline there are no more rounds, but for the second one,
+    /// without which there is no interval.
+    fn rounds(
+        &self,
+        plan: &Plan,
+        measured: &mut Measured,
+        deadline: Instant,
+        out: &Path,
+    ) -> Result<()> {
         let count = self.built.len();
         let in_round: usize = plan.pixels.iter().map(|p| p.unwrap_or(self.order.len())).sum();
         self.bar.set_length((in_round * plan.rounds) as u64);
         self.bar.set_position(0);
         for round in 0..plan.rounds {
+            if round >= 2 && Instant::now() > deadline {
+                let problem = format!("stopped after {round} of {} planned runs", plan.rounds);
+                measured.notes.push(problem);
+                break;
+            }
             let mut renderings: Vec<Option<(Rendering, Option<Vec<u32>>)>> = vec![None; count];
             for turn in 0..count {
                 // Who goes first changes from round to round.
@@ -195,14 +211,24 @@ impl Bench<'_> {
                 let structure = measured.structures[i].structure;
                 self.bar.set_message(format!("{} {}/{}", structure.name(), round + 1, plan.rounds));
                 let sample = plan.pixels[i].map(|size| self.sample(round, size));
-                let rendering = self.timed(i, sample.as_deref());
+                let limit = deadline.max(Instant::now() + LEAST_RUN);
+                let rendering = self.timed(i, sample.as_deref(), limit);
+                if !rendering.finished {
+                    measured.notes.push(format!(
+                        "{}: run {} stopped at the time limit after {} pixels and {} rays",
+                        structure.name(),
+                        round + 1,
+                        rendering.pixels_done,
+                        rendering.rays.total()
+                    ));
+                }
                 measured.structures[i].runs.push(Run {
                     pixels: rendering.pixels_done,
                     rays: rendering.rays.total(),
                     seconds: rendering.time.as_secs_f64(),
                     whole_seconds: self.whole(&rendering),
                 });
-                if round == 0 && sample.is_none() {
+                if round == 0 && sample.is_none() && rendering.finished {
                     let name = format!("{}_{}.png", measured.name, structure.name());
                     rendering.image.write_png(&out.join(name))?;
                 }
@@ -215,10 +241,9 @@ impl Bench<'_> {
         Ok(())
     }
 
-    fn timed(&self, i: usize, sample: Option<&[u32]>) -> Rendering {
+    fn timed(&self, i: usize, sample: Option<&[u32]>, limit: Instant) -> Rendering {
         let progress = |pixels| self.bar.inc(pixels);
-        let far = Instant::now() + Duration::from_secs(3600);
-        render(self.scene, &self.built[i].accel(), &self.job(sample, far, Some(&progress)))
+        render(self.scene, &self.built[i].accel(), &self.job(sample, limit, Some(&progress)))
     }
 
     /// The sample of a round: the rounds go through the scattered order one after the other.
@@ -243,22 +268,29 @@ impl Bench<'_> {
 }
 
 impl Measured {
-    /// Compares every rendering of a round with the first one that is whole, or just the first.
+    /// Compares the renderings of a round with the first one that is whole; without a whole one,
+    /// with the first one, as far as both went through the same pixels.
     fn compare(&mut self, renderings: &[(Rendering, Option<Vec<u32>>)]) {
-        let base = renderings.iter().position(|(_, sample)| sample.is_none()).unwrap_or(0);
+        let is_whole = |(r, sample): &(Rendering, Option<Vec<u32>>)| sample.is_none() && r.finished;
+        let whole = renderings.iter().position(is_whole);
+        let (base, base_sample) = &renderings[whole.unwrap_or(0)];
         for (i, (rendering, sample)) in renderings.iter().enumerate() {
-            if i != base {
-                let (compared, differing) =
-                    differences(&renderings[base].0.image, rendering, sample.as_deref());
-                self.compared.0 += compared;
-                self.compared.1 += differing;
+            let done = match whole {
+                Some(_) => rendering.pixels_done,
+                None if sample == base_sample => rendering.pixels_done.min(base.pixels_done),
+                None => 0,
+            };
+            if i != whole.unwrap_or(0) {
+                self.compared.0 += done;
+                self.compared.1 +=
+                    differing(&base.image, &rendering.image, sample.as_deref(), done);
             }
         }
     }
 
     fn note_plan(&mut self, plan: &Plan, wanted: u32) {
         if plan.rounds < wanted as usize {
-            self.notes.push(format!("{} of {wanted} runs, to keep the budget", plan.rounds));
+            self.notes.push(format!("{} runs, not {wanted}, to keep the budget", plan.rounds));
         }
         let total = self.resolution[0] as usize * self.resolution[1] as usize;
         for (result, pixels) in self.structures.iter().zip(&plan.pixels) {
@@ -273,14 +305,10 @@ impl Measured {
     }
 }
 
-/// How many pixels of `rendering` can be compared with `base`, and how many differ.
-fn differences(base: &Image, rendering: &Rendering, sample: Option<&[u32]>) -> (usize, usize) {
-    let Some(sample) = sample else {
-        return (base.pixels.len(), base.differing_pixels(&rendering.image));
-    };
-    let done = &sample[..rendering.pixels_done];
-    let differs = |&&p: &&u32| base.pixels[p as usize] != rendering.image.pixels[p as usize];
-    (done.len(), done.iter().filter(differs).count())
+/// How many of the first `done` pixels, of `sample` or in order, differ.
+fn differing(a: &Image, b: &Image, sample: Option<&[u32]>, done: usize) -> usize {
+    let pixel = |k: usize| sample.map_or(k, |list| list[k] as usize);
+    (0..done).map(pixel).filter(|&p| a.pixels[p] != b.pixels[p]).count()
 }
 
 /// A bar on the terminal; nothing where there is none.

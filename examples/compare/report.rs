@@ -68,7 +68,7 @@ impl Report {
         }
         println!("{:20} {:>24} {:>24}   grid / bvh (95 %)", "scene", "grid, s", "bvh, s");
         for scene in &self.scenes {
-            let cell = |s| scene.result(s).map(mean_text).unwrap_or_default();
+            let cell = |s| scene.result(s).map(|r| scene.mean(r)).unwrap_or_default();
             let ratio = scene.ratio(Structure::Grid).map(ratio_text).unwrap_or_default();
             let (grid, bvh) = (cell(Structure::Grid), cell(Structure::Bvh));
             println!("{:20} {grid:>24} {bvh:>24}   {ratio}", scene.name);
@@ -169,6 +169,10 @@ impl Measured {
         result.runs.iter().any(|run| run.pixels < whole)
     }
 
+    fn mean(&self, result: &MeasuredStructure) -> String {
+        result.summary().map(|s| mean_of(&s, self.is_sampled(result))).unwrap_or_default()
+    }
+
     /// The scene's name, marked when one of its times is extrapolated.
     fn label(&self) -> String {
         let sampled = self.structures.iter().any(|result| self.is_sampled(result));
@@ -257,11 +261,6 @@ fn summary_record(scene: &Measured, result: &MeasuredStructure) -> Vec<String> {
 
 fn bytes_per_prim(scene: &Measured, result: &MeasuredStructure) -> f64 {
     result.info.size as f64 / (scene.triangles + scene.spheres).max(1) as f64
-}
-
-fn mean_text(result: &MeasuredStructure) -> String {
-    let varied = result.runs.windows(2).any(|pair| pair[0].seconds != pair[0].whole_seconds);
-    result.summary().map(|s| mean_of(&s, varied)).unwrap_or_default()
 }
 
 fn mean_of(summary: &Summary, sampled: bool) -> String {

@@ -46,7 +46,7 @@ pub fn ball() -> RenderScene {
     let mesh = make::blob(870_000, 5);
     parts.mesh(mesh, Material::matte([0.75, 0.7, 0.6]).shiny(0.15, 20.0));
     let camera = View { eye: [0.5, 1.4, 4.2], target: [0.0; 3], fov: 36.0 };
-    parts.seen(camera, [800, 800], &[([4.0, 4.0, 3.0], 5_500.0)])
+    parts.seen(camera, [800, 800], &[([2.0, 3.5, 5.0], 9_500.0), ([-6.0, 2.0, 1.0], 2_000.0)])
 }
 
 /// Nine knots of 200,000 triangles each on two triangles of floor, 2 wide and 101 long.
@@ -91,11 +91,11 @@ pub fn stadium() -> RenderScene {
     parts.seen_with(camera, DVec3::Z, [960, 540], &[([6.0, -8.0, 12.0], 45_000.0)])
 }
 
-/// Glass and mirror balls, meshes and spheres, among small dull ones on a floor.
+/// Glass and mirror balls, meshes and spheres, among small dull ones in a room.
 pub fn glass() -> RenderScene {
     let mut parts = Parts::default();
-    let floor = [[-9.0, 0.0, 6.0], [9.0, 0.0, 6.0], [9.0, 0.0, -12.0], [-9.0, 0.0, -12.0]];
-    parts.mesh(quad(floor), Material::matte([0.6, 0.6, 0.65]));
+    let room = make::box_mesh([-9.0, 0.0, -9.0], [9.0, 9.0, 10.0], 10);
+    parts.mesh(room, Material::matte([0.7, 0.72, 0.78]));
     let absorption = DVec3::new(0.25, 0.05, 0.15);
     let glass = MaterialKind::Dielectric { refraction_index: 1.5, absorption };
     let mirror = MaterialKind::Mirror { reflectance: DVec3::splat(0.75) };
@@ -117,12 +117,8 @@ pub fn glass() -> RenderScene {
         parts.sphere([x, radius, z, radius], dull);
     }
     let camera = View { eye: [0.0, 2.6, 8.5], target: [0.0, 0.7, -0.4], fov: 34.0 };
-    let lights = [([-4.0, 7.0, 5.0], 9_000.0), ([5.0, 6.0, 2.0], 3_500.0)];
-    RenderScene {
-        max_recursion_depth: 6,
-        background: DVec3::new(28.0, 34.0, 46.0),
-        ..parts.seen(camera, [960, 540], &lights)
-    }
+    let lights = [([-4.0, 7.5, 5.0], 11_000.0), ([5.0, 6.5, 2.0], 5_000.0)];
+    RenderScene { max_recursion_depth: 6, ..parts.seen(camera, [960, 540], &lights) }
 }
 
 /// Geometry with its materials, while a scene is being put together.

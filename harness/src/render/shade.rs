@@ -59,7 +59,8 @@ impl<'a, T: Tracer> Shader<'a, T> {
         let point = self.point(ray, hit);
         let scene = self.scene;
         let material = &scene.materials[scene.geometry_material[hit.geometry as usize]];
-        let local = self.local(&point, material);
+        let local =
+            if point.is_inside_of(material) { DVec3::ZERO } else { self.local(&point, material) };
         if depth >= scene.max_recursion_depth {
             return local;
         }
@@ -163,6 +164,12 @@ impl<'a, T: Tracer> Shader<'a, T> {
 }
 
 impl Point {
+    /// Whether the ray came through glass: from there, no lamp shines on the surface.
+    fn is_inside_of(&self, material: &Material) -> bool {
+        let glass = matches!(material.kind, MaterialKind::Dielectric { .. });
+        glass && self.direction.dot(self.normal) > 0.0
+    }
+
     /// The normal on the side from which the ray came.
     fn facing_normal(&self) -> DVec3 {
         if self.direction.dot(self.normal) > 0.0 { -self.normal } else { self.normal }
