@@ -42,7 +42,10 @@ step_build() {
     fi
 }
 
-step_test() { cargo test --workspace --features raykern/capi; }
+step_test() {
+    cargo test --workspace --features raykern/capi
+    cargo test --example compare
+}
 
 step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features raykern/capi; }
 

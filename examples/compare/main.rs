@@ -18,7 +18,7 @@ mod subjects;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Parser;
 use raykern_harness::shared_scenes;
 
@@ -49,12 +49,20 @@ fn run(options: &Options) -> Result<()> {
     let mut report = Report::create(&options.out)?;
     println!("{}", report::preamble(options, folder.as_deref()));
     let budget = Duration::from_secs(options.budget);
+    let mut failed = 0;
     for (number, subject) in subjects.iter().enumerate() {
         let left = budget.saturating_sub(start.elapsed());
         let share = left / (subjects.len() - number) as u32;
-        let measured = measure::scene(subject, options, Instant::now() + share)
-            .with_context(|| format!("scene {}", subject.name))?;
-        report.add(measured)?;
+        match measure::scene(subject, options, Instant::now() + share) {
+            Ok(measured) => report.add(measured)?,
+            // The other scenes do not suffer for it; the exit code says so at the end.
+            Err(error) => {
+                eprintln!("error: scene {}: {error:#}", subject.name);
+                failed += 1;
+            }
+        }
     }
-    report.finish(start.elapsed())
+    report.finish(start.elapsed())?;
+    anyhow::ensure!(failed == 0, "{failed} of {} scenes could not be compared", subjects.len());
+    Ok(())
 }
