@@ -258,35 +258,3 @@ fn rounded_weights([u, v]: [f64; 2]) -> [f32; 2] {
     let v = (v as f32).max(0.0).min(1.0 - u) + 0.0;
     [u, v]
 }
-
-#[cfg(all(test, feature = "alloc"))]
-mod tests {
-    use super::*;
-    use crate::build::{BuildOptions, PlainList};
-    use crate::owned::OwnedAccel;
-    use crate::scene::{Mesh, Scene};
-
-    /// The first primitive id of a block over one geometry: behind the header and its line.
-    const FIRST_ID: usize = 192;
-
-    #[test]
-    fn opening_looks_into_the_parts() {
-        let triangles = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]];
-        let meshes = [Mesh::soup(&triangles)];
-        let scene = Scene::new(&meshes, &[]);
-        for plain_list in [PlainList::Never, PlainList::Always] {
-            let options = BuildOptions { plain_list, ..Default::default() };
-            for built in [OwnedAccel::bvh(&scene, &options), OwnedAccel::grid(&scene, &options)] {
-                let built = built.expect("a structure");
-                let block = built.accel().block();
-                assert!(Accel::open(block).is_ok());
-                let mut copy = crate::storage::AlignedMemory::new(block.len()).expect("memory");
-                let bytes = crate::storage::zeroed(copy.uninit());
-                bytes.copy_from_slice(block);
-                assert!(Accel::open(bytes).is_ok());
-                bytes[FIRST_ID] = 1;
-                assert_eq!(Accel::open(bytes).err(), Some(OpenError::Corrupt));
-            }
-        }
-    }
-}
