@@ -33,8 +33,8 @@ fn given(ray: &PreparedRay) -> ([f32; 3], Vector) {
     (narrow(ray.origin), difference(narrow(ray.direction), [0.0; 3]))
 }
 
-/// The exact volumes over the edges opposite to the second, third and first vertex: twice those
-/// that the triangle test computes in `f64` are these.
+/// The volumes `d . (p x q)` over the edges opposite to the second, third and first vertex, half of
+/// what the triangle test computes in `f64`.
 pub(crate) fn volumes(ray: &PreparedRay, [a, b, c]: [[f32; 3]; 3]) -> [Expansion; 3] {
     let (o, d) = given(ray);
     let (ra, rb, rc) = (difference(a, o), difference(b, o), difference(c, o));
