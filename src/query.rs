@@ -3,7 +3,7 @@
 use core::cmp::Ordering;
 
 use crate::block::Geometry;
-use crate::exact::Quotient;
+use crate::exact::{Distance, Meeting};
 use crate::ray::{NONE, PreparedRay};
 
 /// Which of two sides of a surface a ray may meet.
@@ -59,8 +59,8 @@ pub(crate) struct Candidate {
     pub t: f64,
     /// A bound on the error of `t`.
     pub t_error: f64,
-    /// The triangle, from which the real `t` follows; `None` for a sphere.
-    pub triangle: Option<[[f32; 3]; 3]>,
+    /// What is met, from which the real `t` follows.
+    pub meeting: Meeting,
     /// Weights of the triangle's second and third vertex.
     pub weights: [f64; 2],
     /// The flat number of the primitive.
@@ -74,24 +74,48 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// The order along the ray; of triangles that of the real `t`. Equal ones are ordered by number.
+    /// Which of the meetings with one primitive this is.
+    fn root(&self) -> usize {
+        match self.meeting {
+            Meeting::Triangle(_) => 0,
+            Meeting::Sphere { root, .. } => root,
+        }
+    }
+
+    /// Whether the real `t` is within the ray's limits.
+    pub fn is_within(&self, ray: &PreparedRay) -> bool {
+        let (t, e) = (self.t, 1.01 * self.t_error);
+        if t + e < ray.t_min || t - e > ray.t_max {
+            return false;
+        }
+        if t - e > ray.t_min && t + e < ray.t_max {
+            return true;
+        }
+        Distance::new(ray, &self.meeting).is_some_and(|t| {
+            t.compare_with(ray.t_min) != Ordering::Less
+                && t.compare_with(ray.t_max) != Ordering::Greater
+        })
+    }
+
+    /// The order along the ray: that of the real `t`, and of equal ones that of the numbers.
     fn order(&self, other: &Candidate, ray: &PreparedRay) -> Ordering {
         let apart = (self.t - other.t).abs() > 1.01 * (self.t_error + other.t_error);
-        let by_t = match (self.triangle, other.triangle) {
-            (Some(p), Some(q)) if !apart => Quotient::new(ray, p).compare(&Quotient::new(ray, q)),
-            _ => self.t.partial_cmp(&other.t).unwrap_or(Ordering::Equal),
+        let by_float = || self.t.partial_cmp(&other.t).unwrap_or(Ordering::Equal);
+        let by_t = if apart {
+            by_float()
+        } else {
+            let distance = |candidate: &Candidate| Distance::new(ray, &candidate.meeting);
+            distance(self).zip(distance(other)).map_or_else(by_float, |(p, q)| p.compare(&q))
         };
         by_t.then(self.prim.cmp(&other.prim))
     }
 
-    /// The nearest `f32` to `t`; for triangles to the real one, ties to even.
+    /// The nearest `f32` to the real `t`, ties to even.
     pub fn rounded_t(&self, ray: &PreparedRay) -> f32 {
-        let near = self.t as f32;
-        let sure = (self.t - self.t_error) as f32 == near && (self.t + self.t_error) as f32 == near;
-        match self.triangle {
-            Some(triangle) if !sure => Quotient::new(ray, triangle).round(),
-            _ => near,
-        }
+        let (near, e) = (self.t as f32, 1.01 * self.t_error);
+        let sure = (self.t - e) as f32 == near && (self.t + e) as f32 == near;
+        let exactly = || Distance::new(ray, &self.meeting).map_or(near, |t| t.round());
+        if sure { near } else { exactly() }
     }
 }
 
@@ -183,7 +207,7 @@ impl Query for Closest<'_, '_> {
     fn accept(&mut self, candidate: &Candidate) -> bool {
         // The grid offers a primitive once for each cell that holds it.
         let first = self.best.is_none_or(|best| {
-            (candidate.prim != best.prim || candidate.triangle.is_none())
+            (candidate.prim != best.prim || candidate.root() != best.root())
                 && candidate.order(&best, self.ray) == Ordering::Less
         });
         if first && self.filter.lets_pass(candidate) {

@@ -162,11 +162,6 @@ impl PreparedRay {
     pub fn slab(&self, aabb: &Aabb, t_bound: f64) -> Interval {
         self.clip(wide(aabb.lower), wide(aabb.upper), t_bound)
     }
-
-    /// Whether `t` is within the ray's limits.
-    pub fn holds(&self, t: f64) -> bool {
-        self.t_min <= t && t <= self.t_max
-    }
 }
 
 impl Interval {

@@ -4,10 +4,10 @@
 
 mod common;
 
-use common::{All, odd_models};
-use raykern::{Facing, Hit, Mesh, NONE, PrimId, QueryOptions, Scene, SphereSet};
+use common::{All, agreed, odd_models};
+use raykern::{Facing, Hit, Mesh, NONE, PrimId, QueryOptions, Ray, Scene, SphereSet};
 use raykern_harness::make::{self, Random};
-use raykern_harness::model::Model;
+use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
 use raykern_harness::rays::{Family, RayMaker};
 
@@ -93,4 +93,74 @@ fn options_are_answered_exactly() {
         }
     }
     assert!(hits > 1_000, "{hits}");
+}
+
+/// A float with a random exponent between two powers of two.
+fn wild(random: &mut Random, [low, high]: [f64; 2]) -> f32 {
+    (random.between(-1.0, 1.0) * 2f64.powf(random.between(low, high))) as f32
+}
+
+/// Triangles and spheres from `number`, and rays towards what is there: all of them judged.
+fn judge_all(rounds: usize, number: impl Fn(&mut Random, usize) -> f32) -> [u64; 3] {
+    const SEED: u64 = 5;
+    let mut random = Random::new(SEED);
+    let [mut rays, mut ties, mut wrong] = [0; 3];
+    for round in 0..rounds {
+        let point = |r: &mut Random| [0, 1, 2].map(|_| number(r, round));
+        let triangles = 1 + random.below(30);
+        let vertices: Vec<_> = (0..3 * triangles).map(|_| point(&mut random)).collect();
+        let indices = (0..triangles as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let spheres: Vec<_> = (0..random.below(12))
+            .map(|_| (point(&mut random), point(&mut random)))
+            .map(|([x, y, z], [r, ..])| [x, y, z, r.abs()])
+            .collect();
+        let mesh = TriangleMesh { vertices: vertices.clone(), indices };
+        let model = Model { meshes: vec![mesh], sphere_sets: vec![spheres] };
+        let (all, oracle) = (All::of(&model), Oracle::new(&model));
+        for _ in 0..200 {
+            let origin = point(&mut random);
+            let to = vertices[random.below(vertices.len())];
+            let direction = match random.below(3) {
+                0 => point(&mut random),
+                1 => [0, 1, 2].map(|k| to[k] - origin[k]),
+                _ => [0, 1, 2].map(|k| to[k] / 2.0 - origin[k] / 2.0),
+            };
+            let mut ray = Ray::new(origin, direction);
+            if random.below(2) == 0 {
+                ray = ray.with_limits(number(&mut random, round), number(&mut random, round));
+            }
+            // Half of the rays leave out a sphere, if it exists.
+            let (prim, geometry) = (random.below(12) as u32, random.below(2) as u32);
+            let skip = (geometry == 1).then_some(PrimId { prim, geometry, instance: NONE });
+            let options = QueryOptions { skip, ..Default::default() };
+            let hit = agreed(&all.accels(), &ray, &options);
+            let judgement = oracle.judge(&ray, &options, hit);
+            if judgement != Judgement::Right {
+                println!("round {round}: {judgement:?} {ray:?} {hit:?}");
+                wrong += 1;
+            }
+            rays += 1;
+            ties += u64::from(!oracle.closest(&ray, &options).equal_t.is_empty());
+        }
+    }
+    [rays, ties, wrong]
+}
+
+/// Small whole numbers: rays through vertices and edges, tangents, spheres and planes met at once.
+#[test]
+fn lattices_are_full_of_ties() {
+    let [rays, ties, wrong] = judge_all(150, |r, _| r.below(5) as f32 - 2.0);
+    println!("{rays} rays, {ties} of them with ties, {wrong} wrong");
+    assert!(ties > rays / 20);
+    assert_eq!(wrong, 0);
+}
+
+/// Every exponent that an `f32` can have, all at once or near either end.
+#[test]
+fn the_whole_range_of_floats() {
+    const RANGES: [[f64; 2]; 4] =
+        [[-149.0, 127.9], [-149.0, -120.0], [100.0, 127.9], [-20.0, 20.0]];
+    let [rays, _, wrong] = judge_all(120, |r, round| wild(r, RANGES[round % 4]));
+    println!("{rays} rays, {wrong} wrong");
+    assert_eq!(wrong, 0);
 }

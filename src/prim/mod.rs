@@ -13,6 +13,7 @@ pub(crate) use triangle::normal;
 pub(crate) use validate::leaves_are_sound;
 
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SphereBlock, TriangleBlock};
+use crate::exact::Meeting;
 use crate::query::{Candidate, Query};
 use crate::ray::PreparedRay;
 
@@ -87,19 +88,17 @@ impl Leaves<'_> {
         Lanes(lanes & block.lanes()).any(|lane| {
             let triangle = block.triangle(lane);
             let Some(hit) = triangle::intersect(ray, triangle) else { return false };
-            // What lies beyond the best hit so far is not looked at closely.
-            hit.t - 1.01 * hit.t_error <= query.t_bound()
-                && hit.is_within(ray, triangle)
-                && query.accept(&Candidate {
-                    t: hit.t,
-                    t_error: hit.t_error,
-                    triangle: Some(triangle),
-                    weights: hit.weights,
-                    prim: self.prim_id(block.first, lane),
-                    place: (number as u32, lane as u32),
-                    front: hit.front,
-                    skippable: true,
-                })
+            let candidate = Candidate {
+                t: hit.t,
+                t_error: hit.t_error,
+                meeting: Meeting::Triangle(triangle),
+                weights: hit.weights,
+                prim: self.prim_id(block.first, lane),
+                place: (number as u32, lane as u32),
+                front: hit.front,
+                skippable: true,
+            };
+            offer(&candidate, ray, query)
         })
     }
 
@@ -113,22 +112,20 @@ impl Leaves<'_> {
     ) -> bool {
         Lanes(lanes & block.lanes()).any(|lane| {
             let (centre, radius) = block.sphere(lane);
-            let Some(roots) = sphere::intersect(ray, centre, radius) else { return false };
-            let nearest = usize::from(roots.t[1].abs() < roots.t[0].abs());
-            // A line that only touches the sphere meets its front and its back in one point.
-            let touches = roots.t[0] == roots.t[1];
+            let Some(hit) = sphere::intersect(ray, centre, radius) else { return false };
             (0..2).any(|root| {
-                ray.holds(roots.t[root])
-                    && query.accept(&Candidate {
-                        t: roots.t[root],
-                        t_error: roots.t_error,
-                        triangle: None,
-                        weights: [0.0; 2],
-                        prim: self.prim_id(block.first, lane),
-                        place: (number as u32, lane as u32),
-                        front: root == 0,
-                        skippable: touches || root == nearest,
-                    })
+                let candidate = Candidate {
+                    t: hit.t[root],
+                    t_error: hit.t_error[root],
+                    meeting: Meeting::Sphere { centre, radius, root },
+                    weights: [0.0; 2],
+                    prim: self.prim_id(block.first, lane),
+                    place: (number as u32, lane as u32),
+                    front: root == 0,
+                    // A line that only touches meets front and back in one point.
+                    skippable: hit.touches || root == hit.nearest,
+                };
+                offer(&candidate, ray, query)
             })
         })
     }
@@ -138,6 +135,14 @@ impl Leaves<'_> {
     fn prim_id(&self, first: u32, lane: usize) -> u32 {
         self.prim_ids.get(first as usize + lane).copied().unwrap_or(crate::ray::NONE)
     }
+}
+
+/// Offers what is within the ray's limits; what lies beyond the best hit so far is not looked at
+/// closely.
+fn offer<Q: Query>(candidate: &Candidate, ray: &PreparedRay, query: &mut Q) -> bool {
+    candidate.t - 1.01 * candidate.t_error <= query.t_bound()
+        && candidate.is_within(ray)
+        && query.accept(candidate)
 }
 
 /// The numbers of the bits that are set, from the lowest.

@@ -1,54 +1,88 @@
-//! Ray against sphere in `f64`.
+//! Ray against sphere: filters in `f64`, and real arithmetic where they are unsure.
 
 use glam::DVec3;
 
+use crate::exact::Roots;
 use crate::math::expansion::{two_product, two_sum};
 use crate::math::float::sqrt;
 use crate::math::rounding::UNIT;
-use crate::math::wide;
+use crate::math::{sum_abs, wide};
 use crate::ray::PreparedRay;
 
 /// Where a ray's line enters and leaves a sphere; `t[0] <= t[1]`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SphereHit {
     pub t: [f64; 2],
-    pub t_error: f64,
+    pub t_error: [f64; 2],
+    /// The root nearer to `t = 0`.
+    pub nearest: usize,
+    /// Whether both roots are one.
+    pub touches: bool,
 }
 
 /// The meetings of the ray's line with the sphere's surface, whatever their `t`.
 ///
-/// Best effort for this version: the discriminant is that of `f64` arithmetic, taken at the point
-/// of the line nearest the centre so that distance does not spoil it. Of the two roots, the larger
-/// comes from the quadratic formula and the smaller from their product, whose cancellation, when the
-/// ray starts on the surface, is carried out in twice the precision.
+/// Exact: hit or miss is that of real arithmetic, for all finite inputs, and each `t` is within its
+/// error. The filter takes the discriminant at the point of the line nearest the centre, so that
+/// distance does not spoil it; the larger root comes from the quadratic formula and the smaller
+/// from their product, whose cancellation, when the ray starts on the surface, is carried out in
+/// twice the precision. What the filter cannot bound well is computed without error.
 ///
-/// Source: \[HGA19\].
+/// Source: \[HGA19\]; the bounds are derived in `docs/METHODS.md`.
 pub(crate) fn intersect(ray: &PreparedRay, centre: [f32; 3], radius: f32) -> Option<SphereHit> {
     let d = ray.direction;
     let r = f64::from(radius);
-    let to_origin = ray.origin - wide(centre);
+    let v = ray.origin - wide(centre);
     let a = d.length_squared();
-    let b = to_origin.dot(d);
-    let nearest = to_origin - d * (b / a);
-    let discriminant = r * r - nearest.length_squared();
-    // Written so that a NaN is a miss.
-    if !(discriminant >= 0.0) {
+    let b = v.dot(d);
+    let l = v - d * (b / a);
+    let (reach, near) = (sum_abs(v), sum_abs(l));
+    let discriminant = r * r - l.length_squared();
+    let unsure = 32.0 * UNIT * near * reach
+        + (16.0 * UNIT * reach) * (16.0 * UNIT * reach)
+        + 16.0 * UNIT * (near * near + r * r);
+    if discriminant < -unsure {
         return None;
+    }
+    let difference_is_exact =
+        (0..3).all(|k| two_sum(ray.origin[k], -f64::from(centre[k])).1 == 0.0);
+    let b_error = 8.0 * UNIT * reach * ray.direction_size;
+    let clear = difference_is_exact && unsure < discriminant / 1024.0 && b_error < b.abs() / 1024.0;
+    if !clear {
+        return exactly(ray, centre, radius);
     }
     let half_chord = sqrt(a * discriminant);
     let q = -(b + half_chord.copysign(b));
-    let product = power(to_origin, r);
-    // With `q` zero the line touches the sphere at `t = 0`.
-    let (far, near) = if q == 0.0 { (0.0, 0.0) } else { (q / a, product / q) };
-    let length = sqrt(a);
-    let size = nearest.length_squared() + r * r + 1e-9 * to_origin.length_squared();
-    let t_error = 64.0 * UNIT * (size / (sqrt(discriminant) * length) + far.abs());
-    let widest = sqrt(64.0 * UNIT * size) / length + 64.0 * UNIT * far.abs();
-    Some(SphereHit { t: [near.min(far), near.max(far)], t_error: t_error.min(widest) })
+    // Half of the discriminant's relative error, and a few roundings.
+    let q_error = b_error + half_chord * (0.51 * unsure / discriminant + 8.0 * UNIT);
+    let (power, power_error) = power(v, r);
+    let (large, small) = (q / a, power / q);
+    let large_error = q_error / a + 8.0 * UNIT * large.abs();
+    let small_error =
+        (power_error + small.abs() * q_error) / q.abs() * 1.01 + 2.0 * UNIT * small.abs();
+    let backwards = large < small;
+    Some(SphereHit {
+        t: if backwards { [large, small] } else { [small, large] },
+        t_error: if backwards { [large_error, small_error] } else { [small_error, large_error] },
+        nearest: usize::from(b > 0.0),
+        touches: false,
+    })
 }
 
-/// `|v|^2 - r^2`, the power of a point, as if rounded from twice the precision.
-fn power(v: DVec3, r: f64) -> f64 {
+/// The same, computed without error and rounded.
+fn exactly(ray: &PreparedRay, centre: [f32; 3], radius: f32) -> Option<SphereHit> {
+    let roots = Roots::new(ray, centre, radius)?;
+    let [(enter, enter_error), (leave, leave_error)] = roots.approximate();
+    Some(SphereHit {
+        t: [enter, leave],
+        t_error: [enter_error, leave_error],
+        nearest: roots.nearest(),
+        touches: roots.touch(),
+    })
+}
+
+/// `|v|^2 - r^2`, the power of a point, in twice the precision, and a bound on its error.
+fn power(v: DVec3, r: f64) -> (f64, f64) {
     let products =
         [two_product(v.x, v.x), two_product(v.y, v.y), two_product(v.z, v.z), two_product(-r, r)];
     let (mut high, mut low) = (0.0, 0.0);
@@ -57,7 +91,9 @@ fn power(v: DVec3, r: f64) -> f64 {
         high = sum;
         low += error + p_error;
     }
-    high + low
+    let size = v.length_squared() + r * r;
+    let power = high + low;
+    (power, 32.0 * UNIT * UNIT * size + UNIT * power.abs())
 }
 
 /// The outward unit normal at `point`, which lies on the sphere up to rounding.

@@ -4,7 +4,7 @@ use core::cmp::Ordering;
 
 use glam::DVec3;
 
-use crate::exact::{self, Quotient};
+use crate::exact::{self, Distance, Meeting};
 use crate::math::rounding::{UNIT, gamma};
 use crate::math::{sum_abs, wide};
 use crate::ray::PreparedRay;
@@ -75,23 +75,7 @@ fn plane(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<(f64, f64)> {
         // A hundredth for the divisor's own error, and the rounding of the quotient.
         return Some((t, 1.01 * t_error + 2.0 * UNIT * t.abs()));
     }
-    Quotient::new(ray, triangle).approximate()
-}
-
-impl TriangleHit {
-    /// Whether the real `t` is within the ray's limits.
-    pub fn is_within(&self, ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> bool {
-        let (t, e) = (self.t, self.t_error);
-        if t + e < ray.t_min || t - e > ray.t_max {
-            return false;
-        }
-        if t - e > ray.t_min && t + e < ray.t_max {
-            return true;
-        }
-        let t = Quotient::new(ray, triangle);
-        t.compare_with(ray.t_min) != Ordering::Less
-            && t.compare_with(ray.t_max) != Ordering::Greater
-    }
+    Some(Distance::new(ray, &Meeting::Triangle(triangle))?.approximate())
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.
