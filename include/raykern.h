@@ -63,8 +63,7 @@
 #define RT_PLAIN_LIST_ALWAYS 2
 
 // `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
-// same answer from every structure; `t` is the nearest float. In this version spheres are decided
-// in doubles: touched, or met next to another surface, within about 1e-15 they may be wrong.
+// same answer from every structure; `t` is the nearest float.
 #define RT_PRECISION_EXACT 0
 // No ray slips through a closed mesh. Unsupported so far.
 #define RT_PRECISION_WATERTIGHT 1

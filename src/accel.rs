@@ -138,9 +138,10 @@ impl<'m> Accel<'m> {
     /// The closest hit: of least `t` in real numbers, and of equal ones the first by geometry and
     /// primitive.
     ///
-    /// Triangles are decided exactly, as in real arithmetic on the given floats, and `t` is the
-    /// nearest float to the real one. Spheres are decided in `f64` in this version: one that the
-    /// ray touches, or meets next to another surface, within about 1e-15 may be decided wrongly.
+    /// Hit or miss, the primitive and the order are those of real arithmetic on the given floats,
+    /// and `t` is the nearest float to the real one. In this version one case is open: the order of
+    /// a sphere and another surface that meet the ray within about 1e-15 of each other, when some
+    /// coordinate is smaller than 2^-110, though not zero, or larger than 2^120.
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.intersect_with(ray, &QueryOptions::default())
     }

@@ -30,8 +30,7 @@ pub const RT_PLAIN_LIST_NEVER: u32 = 1;
 pub const RT_PLAIN_LIST_ALWAYS: u32 = 2;
 
 /// `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
-/// same answer from every structure; `t` is the nearest float. In this version spheres are decided
-/// in doubles: touched, or met next to another surface, within about 1e-15 they may be wrong.
+/// same answer from every structure; `t` is the nearest float.
 pub const RT_PRECISION_EXACT: u32 = 0;
 /// No ray slips through a closed mesh. Unsupported so far.
 pub const RT_PRECISION_WATERTIGHT: u32 = 1;
