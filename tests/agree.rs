@@ -4,12 +4,13 @@
 
 mod common;
 
-use common::{All, agreed, odd_models};
+use common::{All, agreed, bits, odd_models};
 use proptest::prelude::*;
 use raykern::{Facing, Mesh, NONE, PrimId, QueryOptions, Ray, Scene, SphereSet};
-use raykern_harness::make;
+use raykern_harness::load::load;
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::{make, shared_scenes};
 
 /// All families over one model; the seed is the family's place, so a failure can be repeated.
 fn check(name: &str, model: &Model, rays_each: usize) -> usize {
@@ -33,6 +34,42 @@ fn check(name: &str, model: &Model, rays_each: usize) -> usize {
 fn made_scenes() {
     for (name, make) in make::ALL {
         assert!(check(name, &make(2_000), 300) > 100, "{name}");
+    }
+}
+
+/// Scenes from files, where they are at hand: grid against BVH, and the list on fewer rays.
+#[test]
+fn scenes_from_files() {
+    let Some(folder) = shared_scenes::folder(None) else {
+        println!("skipped: no folder of scenes (RAYKERN_SCENES)");
+        return;
+    };
+    for file in [
+        "metu/simple.xml",
+        "metu/two_spheres.xml",
+        "metu/bunny.xml",
+        "metu/monkey.xml",
+        "metu/dragon_lowres.xml",
+        "classic/teapot.obj",
+        "classic/sponza_part.obj",
+    ] {
+        let model = load(&folder.join(file)).unwrap_or_else(|error| panic!("{error}")).model;
+        let all = All::of(&model);
+        let [list, grid, bvh] = all.accels();
+        let mut hits = 0;
+        for (seed, family) in Family::ORDINARY.into_iter().chain(Family::HOSTILE).enumerate() {
+            let rays = RayMaker::new(&model, seed as u64).many(family, 300);
+            for (i, ray) in rays.iter().enumerate() {
+                let options = QueryOptions::default();
+                let hit = agreed(&[grid, bvh], ray, &options);
+                hits += usize::from(hit.is_some());
+                if i < 10 {
+                    let listed = list.1.intersect(ray);
+                    assert_eq!(bits(listed), bits(hit), "{file} {family:?}, seed {seed}: {ray:?}");
+                }
+            }
+        }
+        assert!(hits > 100, "{file}: {hits} hits");
     }
 }
 

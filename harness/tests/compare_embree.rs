@@ -1,4 +1,5 @@
-//! Grid and BVH against Embree on a million rays a scene; the oracle judges each disagreement.
+//! Grid and BVH, through the C interface, against Embree on a million rays a scene; the oracle judges
+//! each disagreement. Scenes that are not generated are skipped where they are not at hand.
 //!
 //! Needs Embree 3, so it stands behind the feature `embree`:
 //! `cargo test --release -p raykern-harness --features embree --test compare_embree -- --nocapture`
@@ -9,15 +10,35 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Instant;
 
-use raykern::{BuildOptions, Hit, NONE, OwnedAccel, QueryOptions, Ray};
-use raykern_harness::make;
+use raykern::{Hit, NONE, QueryOptions, Ray};
+use raykern_harness::load::load;
 use raykern_harness::model::Model;
-use raykern_harness::oracle::{Judgement, Oracle, ulps_apart};
+use raykern_harness::oracle::{Judgement, Oracle, Place, Verdict};
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::{make, shared_scenes};
 
-/// Two right primitives with `t` this close count as agreement.
-const ULPS: u64 = 64;
+/// The files of scenes.
+const SHARED: [&str; 8] = [
+    "metu/bunny.xml",
+    "metu/monkey.xml",
+    "metu/chinese_dragon.xml",
+    "metu/scienceTree_glass.xml",
+    "classic/sponza_part.obj",
+    "classic/japanese_maple.obj",
+    "classic/teapot_stadium.xml",
+    "classic/samurai_monastry.obj",
+];
+
+/// The grid gets each ray but here, where each tests thousands of triangles: a regular grid puts the
+/// dense object into a few cells.
+const GRID_STRIDE: [(&str, usize); 4] = [
+    ("dense_on_floor", 100),
+    ("scienceTree_glass", 100),
+    ("teapot_stadium", 100),
+    ("samurai_monastry", 100),
+];
 
 const RAYS: usize = 1_000_000;
 
@@ -35,14 +56,27 @@ fn rays(model: &Model) -> Vec<Ray> {
     shares.into_iter().flat_map(|(family, count)| maker.many(family, count)).collect()
 }
 
+fn run(command: &mut Command) {
+    let status = command.status().unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    assert!(status.success(), "{command:?}: {status}");
+}
+
+/// The program, against the header and the static library of raykern.
 fn compiled(folder: &Path) -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    // A directory of its own, so that the nested cargo does not wait for the one that runs the test.
+    let target = root.join("target/c-tests");
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.current_dir(&root).env("CARGO_TARGET_DIR", &target);
+    run(cargo.args(["--offline", "build", "--release", "-p", "raykern-c"]));
+    let host = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
+    let mut build = cc::Build::new();
+    build.target(&host).host(&host).opt_level(2).cargo_metadata(false).out_dir(folder);
     let program = folder.join("compare_embree");
-    let mut compiler = Command::new(std::env::var_os("CC").unwrap_or("cc".into()));
-    let source = root.join("c_tests/compare_embree.c");
-    compiler.args(["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror"]).arg(source);
-    compiler.arg("-o").arg(&program).args(["-lembree3", "-lm"]);
-    assert!(compiler.status().expect("a C compiler").success(), "the program does not compile");
+    let mut compiler = build.get_compiler().to_command();
+    compiler.args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-I"]).arg(root.join("include"));
+    compiler.arg(root.join("c_tests/compare_embree.c")).arg(target.join("release/libraykern.a"));
+    run(compiler.args(["-lembree3", "-lpthread", "-lm", "-ldl", "-o"]).arg(&program));
     program
 }
 
@@ -66,38 +100,53 @@ fn ray_bytes(rays: &[Ray]) -> Vec<u8> {
     rays.iter().flat_map(words).flat_map(|x| x.to_ne_bytes()).collect()
 }
 
-/// What Embree hits; it gives no weights that could be compared.
-fn embree(program: &Path, folder: &Path, model: &Model, rays: &[Ray]) -> Vec<Option<Hit>> {
-    let [scene, ray_file, hits] = ["scene", "rays", "hits"].map(|name| folder.join(name));
-    fs::write(&scene, scene_bytes(model)).expect("the scene is written");
-    fs::write(&ray_file, ray_bytes(rays)).expect("the rays are written");
-    let run = Command::new(program).args([&scene, &ray_file, &hits]).status();
-    assert!(run.expect("the program starts").success(), "Embree failed");
-    let bytes = fs::read(&hits).expect("the hits are there");
-    assert_eq!(bytes.len(), 12 * rays.len());
-    let (words, _) = bytes.as_chunks::<4>();
-    let (answers, _) = words.as_chunks::<3>();
-    let answer = |[t, prim, geometry]: &[[u8; 4]; 3]| {
-        let (prim, geometry) = (u32::from_ne_bytes(*prim), u32::from_ne_bytes(*geometry));
-        let t = f32::from_ne_bytes(*t);
-        (geometry != NONE).then_some(Hit { t, u: 0.0, v: 0.0, prim, geometry, instance: NONE })
-    };
-    answers.iter().map(answer).collect()
+/// What the three answered to one ray.
+struct Disagreement {
+    ray: usize,
+    grid: Option<Hit>,
+    bvh: Option<Hit>,
+    embree: Option<Hit>,
 }
 
-fn agree(a: Option<Hit>, b: Option<Hit>) -> bool {
-    match (a, b) {
-        (None, None) => true,
-        (Some(a), Some(b)) => {
-            (a.prim, a.geometry) == (b.prim, b.geometry) && ulps_apart(a.t, b.t) <= ULPS
-        }
-        _ => false,
-    }
+struct Traced {
+    grid_rays: u32,
+    /// Rays on which grid and BVH differ in any byte.
+    differences: u32,
+    disagreements: Vec<Disagreement>,
+}
+
+fn hit(words: &[u32]) -> Option<Hit> {
+    let [t, u, v] = [0, 1, 2].map(|i| f32::from_bits(words[i]));
+    let (prim, geometry, instance) = (words[3], words[4], words[5]);
+    (geometry != NONE).then_some(Hit { t, u, v, prim, geometry, instance })
+}
+
+fn trace(program: &Path, folder: &Path, model: &Model, rays: &[Ray], stride: usize) -> Traced {
+    let [scene, ray_file, output] = ["scene", "rays", "output"].map(|name| folder.join(name));
+    fs::write(&scene, scene_bytes(model)).expect("the scene is written");
+    fs::write(&ray_file, ray_bytes(rays)).expect("the rays are written");
+    let mut command = Command::new(program);
+    run(command.args([&scene, &ray_file]).arg(stride.to_string()).arg(&output));
+    let bytes = fs::read(&output).expect("the output is there");
+    let (words, _) = bytes.as_chunks::<4>();
+    let words: Vec<u32> = words.iter().map(|word| u32::from_ne_bytes(*word)).collect();
+    let (counts, records) = words.split_at(4);
+    assert_eq!(counts[0] as usize, rays.len());
+    assert_eq!(counts[1] as usize, rays.len().div_ceil(stride));
+    assert_eq!(counts[3] as usize * 16, records.len());
+    let record = |w: &[u32; 16]| Disagreement {
+        ray: w[0] as usize,
+        grid: hit(&w[1..7]),
+        bvh: hit(&w[7..13]),
+        // It gives no weights that could be compared.
+        embree: hit(&[w[13], 0, 0, w[14], w[15], NONE]),
+    };
+    let disagreements = records.as_chunks().0.iter().map(record).collect();
+    Traced { grid_rays: counts[1], differences: counts[2], disagreements }
 }
 
 #[derive(Default)]
 struct Row {
-    disagreements: usize,
     false_misses: usize,
     false_hits: usize,
     wrong_prims: usize,
@@ -106,44 +155,73 @@ struct Row {
     ours_wrong: usize,
 }
 
-fn compare(model: &Model, rays: &[Ray], theirs: &[Option<Hit>]) -> Row {
-    let (oracle, options) = (Oracle::new(model), QueryOptions::default());
-    let built = model.with_scene(|scene| {
-        [OwnedAccel::grid, OwnedAccel::bvh].map(|build| build(scene, &BuildOptions::default()))
-    });
-    let built = built.map(|accel| accel.expect("it is built"));
-    let accels = [built[0].accel(), built[1].accel()];
-    let mut row = Row::default();
-    for (ray, theirs) in rays.iter().zip(theirs) {
-        let ours = accels.map(|accel| accel.intersect(ray));
-        if ours.iter().all(|hit| agree(*hit, *theirs)) {
-            continue;
-        }
-        row.disagreements += 1;
+impl Row {
+    fn add(&mut self, oracle: &Oracle, ray: &Ray, found: &Disagreement) {
+        let options = QueryOptions::default();
         let verdict = oracle.closest(ray, &options);
-        for hit in ours {
+        for hit in [found.grid, found.bvh] {
             let judgement = oracle.judge_by(&verdict, ray, &options, hit);
             if judgement != Judgement::Right {
                 println!("ours {judgement:?}: {ray:?} {hit:?}");
-                row.ours_wrong += 1;
+                self.ours_wrong += 1;
             }
         }
-        match oracle.judge_by(&verdict, ray, &options, *theirs) {
-            Judgement::FalseMiss => row.false_misses += 1,
-            Judgement::FalseHit => row.false_hits += 1,
-            Judgement::WrongPrim => {
-                let tie = theirs.is_some_and(|hit| {
-                    let same = |p: &raykern_harness::oracle::Place| {
-                        (p.geometry, p.prim) == (hit.geometry, hit.prim)
-                    };
-                    verdict.equal_t.iter().any(same)
-                });
-                *(if tie { &mut row.ties } else { &mut row.wrong_prims }) += 1;
-            }
-            _ => row.t_only += 1,
+        match oracle.judge_by(&verdict, ray, &options, found.embree) {
+            Judgement::FalseMiss => self.false_misses += 1,
+            Judgement::FalseHit => self.false_hits += 1,
+            Judgement::WrongPrim if is_tie(&verdict, found.embree) => self.ties += 1,
+            Judgement::WrongPrim => self.wrong_prims += 1,
+            _ => self.t_only += 1,
         }
     }
-    row
+
+    fn plus(self, other: Row) -> Row {
+        Row {
+            false_misses: self.false_misses + other.false_misses,
+            false_hits: self.false_hits + other.false_hits,
+            wrong_prims: self.wrong_prims + other.wrong_prims,
+            ties: self.ties + other.ties,
+            t_only: self.t_only + other.t_only,
+            ours_wrong: self.ours_wrong + other.ours_wrong,
+        }
+    }
+}
+
+fn is_tie(verdict: &Verdict, hit: Option<Hit>) -> bool {
+    let place = hit.map(|hit| Place { geometry: hit.geometry, prim: hit.prim });
+    place.is_some_and(|place| verdict.equal_t.contains(&place))
+}
+
+/// Each disagreement, judged on two threads.
+fn judged(model: &Model, rays: &[Ray], found: &[Disagreement]) -> Row {
+    let oracle = Oracle::new(model);
+    let judge = |part: &[Disagreement]| {
+        let mut row = Row::default();
+        part.iter().for_each(|one| row.add(&oracle, &rays[one.ray], one));
+        row
+    };
+    let (first, second) = found.split_at(found.len() / 2);
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| judge(second));
+        judge(first).plus(other.join().expect("the other half is judged"))
+    })
+}
+
+/// The generated scenes with triangles, and those from files.
+fn scenes() -> Vec<(String, Model)> {
+    let made = make::ALL.iter().map(|(name, make)| (name.to_string(), make(100_000)));
+    let mut scenes: Vec<_> = made.collect();
+    match shared_scenes::folder(None) {
+        None => println!("skipped: no folder of scenes (RAYKERN_SCENES)"),
+        Some(folder) => scenes.extend(SHARED.map(|file| {
+            let scene = load(&folder.join(file)).unwrap_or_else(|error| panic!("{error}"));
+            let name = Path::new(file).file_stem().unwrap_or_default();
+            (name.to_string_lossy().into_owned(), scene.model)
+        })),
+    }
+    scenes.iter_mut().for_each(|(_, model)| model.sphere_sets.clear());
+    scenes.retain(|(_, model)| model.triangle_count() > 0);
+    scenes
 }
 
 #[test]
@@ -151,34 +229,35 @@ fn every_disagreement_with_embree_is_embrees() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compare_embree");
     fs::create_dir_all(&folder).expect("a folder for files");
     let program = compiled(&folder);
-    let mut wrong = 0;
+    let (mut wrong, mut differences) = (0, 0);
     println!(
-        "scene             rays  disagree   f.miss    f.hit     prim |  ties   t only | ours wrong"
+        "scene                 rays     grid  disagree   f.miss    f.hit     prim |  ties   t only \
+         | ours wrong  grid != bvh    trace s  judge s"
     );
-    for (name, make) in make::ALL {
-        // A regular grid puts the dense object into a few cells and tests all of it.
-        let triangles = if name == "dense_on_floor" { 2_000 } else { 100_000 };
-        let mut model = make(triangles);
-        if model.meshes.is_empty() {
-            continue;
-        }
-        model.sphere_sets.clear();
+    for (name, model) in scenes() {
+        let stride = GRID_STRIDE.iter().find(|(slow, _)| *slow == name).map_or(1, |slow| slow.1);
         let rays = rays(&model);
-        let theirs = embree(&program, &folder, &model, &rays);
-        let row = compare(&model, &rays, &theirs);
+        let started = Instant::now();
+        let traced = trace(&program, &folder, &model, &rays, stride);
+        let tracing = started.elapsed().as_secs_f64();
+        let row = judged(&model, &rays, &traced.disagreements);
         println!(
-            "{name:14} {:8} {:9} {:8} {:8} {:8} {:7} {:8} {:10}",
+            "{name:17} {:8} {:8} {:9} {:8} {:8} {:8} {:7} {:8} {:12} {:12} {tracing:10.1} {:8.1}",
             rays.len(),
-            row.disagreements,
+            traced.grid_rays,
+            traced.disagreements.len(),
             row.false_misses,
             row.false_hits,
             row.wrong_prims,
             row.ties,
             row.t_only,
-            row.ours_wrong
+            row.ours_wrong,
+            traced.differences,
+            started.elapsed().as_secs_f64() - tracing
         );
         wrong += row.ours_wrong;
+        differences += traced.differences;
     }
     fs::remove_dir_all(&folder).expect("the folder is removed");
-    assert_eq!(wrong, 0);
+    assert_eq!((wrong, differences), (0, 0), "ours wrong, grid != bvh");
 }
