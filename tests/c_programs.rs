@@ -31,7 +31,7 @@ fn run(command: &mut Command) -> String {
 
 fn cargo() -> Command {
     let mut cargo = Command::new(env!("CARGO"));
-    cargo.current_dir(root()).env("CARGO_TARGET_DIR", target()).arg("--offline");
+    cargo.current_dir(root()).env("CARGO_TARGET_DIR", target()).arg("--locked");
     cargo
 }
 

@@ -68,7 +68,7 @@ fn compiled(folder: &Path) -> PathBuf {
     let target = root.join("target/c-tests");
     let mut cargo = Command::new(env!("CARGO"));
     cargo.current_dir(&root).env("CARGO_TARGET_DIR", &target);
-    run(cargo.args(["--offline", "build", "--release", "-p", "raykern-c"]));
+    run(cargo.args(["--locked", "build", "--release", "-p", "raykern-c"]));
     let host = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
     let mut build = cc::Build::new();
     build.target(&host).host(&host).opt_level(2).cargo_metadata(false).out_dir(folder);
