@@ -34,10 +34,10 @@ const SHARED: [&str; 8] = [
 /// The grid gets each ray but here, where each tests thousands of triangles: a regular grid puts the
 /// dense object into a few cells.
 const GRID_STRIDE: [(&str, usize); 4] = [
-    ("dense_on_floor", 100),
-    ("scienceTree_glass", 100),
-    ("teapot_stadium", 100),
-    ("samurai_monastry", 100),
+    ("dense_on_floor", 10),
+    ("scienceTree_glass", 10),
+    ("teapot_stadium", 10),
+    ("samurai_monastry", 10),
 ];
 
 const RAYS: usize = 1_000_000;
