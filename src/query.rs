@@ -4,7 +4,7 @@ use core::cmp::Ordering;
 
 use crate::block::Geometry;
 use crate::exact::{Distance, Meeting};
-use crate::ray::{NONE, PreparedRay};
+use crate::ray::{Interval, NONE, PreparedRay};
 
 /// Which of two sides of a surface a ray may meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,13 +82,22 @@ impl Candidate {
         }
     }
 
+    /// Floats between which the real `t` lies.
+    ///
+    /// `t_error` grants at least one rounding of `t` more than the error needs, which covers the
+    /// rounding of these two sums; a hundredth of it covers its own arithmetic.
+    pub fn interval(&self) -> Interval {
+        let margin = 1.01 * self.t_error;
+        Interval { near: self.t - margin, far: self.t + margin }
+    }
+
     /// Whether the real `t` is within the ray's limits.
     pub fn is_within(&self, ray: &PreparedRay) -> bool {
-        let (t, e) = (self.t, 1.01 * self.t_error);
-        if t + e < ray.t_min || t - e > ray.t_max {
+        let Interval { near, far } = self.interval();
+        if far < ray.t_min || near > ray.t_max {
             return false;
         }
-        if t - e > ray.t_min && t + e < ray.t_max {
+        if near > ray.t_min && far < ray.t_max {
             return true;
         }
         Distance::new(ray, &self.meeting).is_some_and(|t| {
@@ -99,7 +108,8 @@ impl Candidate {
 
     /// The order along the ray: that of the real `t`, and of equal ones that of the numbers.
     fn order(&self, other: &Candidate, ray: &PreparedRay) -> Ordering {
-        let apart = (self.t - other.t).abs() > 1.01 * (self.t_error + other.t_error);
+        let (a, b) = (self.interval(), other.interval());
+        let apart = a.far < b.near || b.far < a.near;
         let by_float = || self.t.partial_cmp(&other.t).unwrap_or(Ordering::Equal);
         let by_t = if apart {
             by_float()
@@ -112,10 +122,12 @@ impl Candidate {
 
     /// The nearest `f32` to the real `t`, ties to even.
     pub fn rounded_t(&self, ray: &PreparedRay) -> f32 {
-        let (near, e) = (self.t as f32, 1.01 * self.t_error);
-        let sure = (self.t - e) as f32 == near && (self.t + e) as f32 == near;
-        let exactly = || Distance::new(ray, &self.meeting).map_or(near, |t| t.round());
-        if sure { near } else { exactly() }
+        let nearest = self.t as f32;
+        let Interval { near, far } = self.interval();
+        if near as f32 == nearest && far as f32 == nearest {
+            return nearest;
+        }
+        Distance::new(ray, &self.meeting).map_or(nearest, |t| t.round())
     }
 }
 
@@ -213,7 +225,7 @@ impl Query for Closest<'_, '_> {
         if first && self.filter.lets_pass(candidate) {
             self.best = Some(*candidate);
             // Boxes are compared with real distances, so the bound is one of the real `t`.
-            self.t_bound = self.t_bound.min(candidate.t + 1.01 * candidate.t_error);
+            self.t_bound = self.t_bound.min(candidate.interval().far);
         }
         false
     }

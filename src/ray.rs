@@ -89,7 +89,7 @@ pub(crate) struct PreparedRay {
     pub t_max: f64,
 }
 
-/// The part `near ..= far` of a ray; empty when `near > far`.
+/// The part `near ..= far` of a ray, or of what is known of a `t`; empty when `near > far`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Interval {
     pub near: f64,

@@ -7,6 +7,7 @@ use super::types::{
 };
 use super::versioned::{self, Output, pointer};
 use super::{accel_at, answer, guard};
+use crate::accel::Accel;
 use crate::query::{Facing, PrimId, QueryOptions};
 use crate::ray::{Hit, Ray};
 use crate::surface::Surface;
@@ -154,22 +155,11 @@ pub unsafe extern "C" fn rt_intersect_batch_with(
     hit_stride: usize,
     count: usize,
 ) -> RtStatus {
-    guard(|| {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        let options = unsafe { query_options(query) }?;
-        let rays = Column::new(rays, ray_stride, count)?;
-        let hits = Column::new(hits.cast_const(), hit_stride, count)?;
-        for i in 0..count {
-            // SAFETY: below `count`, and valid as the caller promises.
-            let ray = unsafe { rays.at(i).read() }.into();
-            let hit = accel.intersect_with(&ray, &options).unwrap_or(Hit::MISS);
-            // SAFETY: as above; C passed this pointer as one to write to.
-            unsafe { hits.at(i).cast_mut().write(hit.into()) };
-        }
-        Ok(())
-    })
+    let ask = |accel: &Accel, ray: &Ray, options: &QueryOptions| {
+        accel.intersect_with(ray, options).unwrap_or(Hit::MISS).into()
+    };
+    // SAFETY: the caller's promise.
+    guard(|| unsafe { batch(accel, (rays, ray_stride), query, (hits, hit_stride), count, ask) })
 }
 
 /// `rt_occluded_with` for `count` rays, `ray_stride` bytes apart, into bytes `occluded_stride` bytes
@@ -189,22 +179,12 @@ pub unsafe extern "C" fn rt_occluded_batch_with(
     occluded_stride: usize,
     count: usize,
 ) -> RtStatus {
-    guard(|| {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        let options = unsafe { query_options(query) }?;
-        let rays = Column::new(rays, ray_stride, count)?;
-        let occluded = Column::new(occluded.cast_const(), occluded_stride, count)?;
-        for i in 0..count {
-            // SAFETY: below `count`, and valid as the caller promises.
-            let ray = unsafe { rays.at(i).read() }.into();
-            let is_occluded = accel.occluded_with(&ray, &options);
-            // SAFETY: as above; C passed this pointer as one to write to.
-            unsafe { occluded.at(i).cast_mut().write(is_occluded.into()) };
-        }
-        Ok(())
-    })
+    let ask = |accel: &Accel, ray: &Ray, options: &QueryOptions| {
+        u8::from(accel.occluded_with(ray, options))
+    };
+    let out = (occluded, occluded_stride);
+    // SAFETY: the caller's promise.
+    guard(|| unsafe { batch(accel, (rays, ray_stride), query, out, count, ask) })
 }
 
 /// Writes to `*out` the surface at a hit that a query on this accel returned for this ray.
@@ -233,6 +213,35 @@ pub unsafe extern "C" fn rt_hit_surface(
         out.write(|struct_size| RtSurface::new(struct_size, &surface));
         Ok(())
     })
+}
+
+/// Asks for each of `count` rays and writes the answers; arrays come with their strides.
+///
+/// # Safety
+///
+/// Every pointer is null or valid for `count` elements, and nobody else uses `out` during the call.
+unsafe fn batch<T>(
+    accel: *const RtAccel,
+    rays: (*const RtRay, usize),
+    query: *const RtQuery,
+    out: (*mut T, usize),
+    count: usize,
+    ask: impl Fn(&Accel, &Ray, &QueryOptions) -> T,
+) -> Result<(), Error> {
+    // SAFETY: the caller's promise.
+    let accel = unsafe { accel_at(accel) }?;
+    // SAFETY: the caller's promise.
+    let options = unsafe { query_options(query) }?;
+    let rays = Column::new(rays.0, rays.1, count)?;
+    let out = Column::new(out.0.cast_const(), out.1, count)?;
+    for i in 0..count {
+        // SAFETY: below `count`, and valid as the caller promises.
+        let ray = unsafe { rays.at(i).read() }.into();
+        let answer = ask(&accel, &ray, &options);
+        // SAFETY: as above; C passed this pointer as one to write to.
+        unsafe { out.at(i).cast_mut().write(answer) };
+    }
+    Ok(())
 }
 
 /// Elements of a caller's array at equal distances.

@@ -71,7 +71,8 @@ impl Plan {
         let head = GridHead::new(&census.bounds, n);
         let prims = u64::from(census.hittable());
         let most = (REFERENCES_PER_PRIM * prims).max(REFERENCES_AT_LEAST).min(u64::from(VALUE));
-        let references = references(scene, &head);
+        // In a single cell everything is once.
+        let references = if n == 1 { prims } else { references(scene, &head) };
         if references > most && n > 1 {
             return None;
         }

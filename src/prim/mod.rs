@@ -140,7 +140,7 @@ impl Leaves<'_> {
 /// Offers what is within the ray's limits; what lies beyond the best hit so far is not looked at
 /// closely.
 fn offer<Q: Query>(candidate: &Candidate, ray: &PreparedRay, query: &mut Q) -> bool {
-    candidate.t - 1.01 * candidate.t_error <= query.t_bound()
+    candidate.interval().near <= query.t_bound()
         && candidate.is_within(ray)
         && query.accept(candidate)
 }
