@@ -160,11 +160,11 @@ static void check_open_and_queries(void) {
     query.struct_size = sizeof query;
     CHECK(rt_query_check(&query) == RT_OK);
     query.precision = RT_PRECISION_WATERTIGHT;
-    CHECK(rt_query_check(&query) == RT_ERROR_UNSUPPORTED);
-    CHECK(!rt_intersect_with(accel, &ray, &query, &hit) && !rt_occluded_with(accel, &ray, &query));
-    CHECK(rt_intersect_batch_with(accel, &ray, 0, &query, &hit, 0, 1) == RT_ERROR_UNSUPPORTED);
+    CHECK(rt_query_check(&query) == RT_OK);
     query.precision = 2;
     CHECK(rt_query_check(&query) == RT_ERROR_INVALID_ARGUMENT);
+    CHECK(!rt_intersect_with(accel, &ray, &query, &hit) && !rt_occluded_with(accel, &ray, &query));
+    CHECK(rt_intersect_batch_with(accel, &ray, 0, &query, &hit, 0, 1) == RT_ERROR_INVALID_ARGUMENT);
     query.precision = 0;
     query.facing = 3;
     CHECK(rt_query_check(&query) == RT_ERROR_INVALID_ARGUMENT);

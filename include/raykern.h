@@ -65,7 +65,8 @@
 // `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
 // same answer from every structure; `t` is the nearest float.
 #define RT_PRECISION_EXACT 0
-// No ray slips through a closed mesh. Unsupported so far.
+// In single precision: nothing that the ray hits is missed, so no ray slips through a closed mesh;
+// `t` is within a bound that docs/METHODS.md states; structures may differ in what they answer.
 #define RT_PRECISION_WATERTIGHT 1
 
 // `RtQuery.facing`: both sides of every surface.

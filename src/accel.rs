@@ -181,19 +181,24 @@ impl<'m> Accel<'m> {
         }
     }
 
-    /// [`intersect`](Self::intersect) that adds what it did to `counts`.
-    pub fn intersect_counted(&self, ray: &Ray, counts: &mut Counts) -> Option<Hit> {
+    /// [`intersect_with`](Self::intersect_with) that adds what it did to `counts`.
+    pub fn intersect_counted(
+        &self,
+        ray: &Ray,
+        options: &QueryOptions,
+        counts: &mut Counts,
+    ) -> Option<Hit> {
         let ray = ray.prepare()?;
-        let query = Closest::new(self.filter(&QueryOptions::default()), &ray);
+        let query = Closest::new(self.filter(options), &ray);
         let mut counted = Counted { query, counts };
         self.ask(&ray, &mut counted);
         counted.query.best.map(|best| self.hit(&ray, &best))
     }
 
-    /// [`occluded`](Self::occluded) that adds what it did to `counts`.
-    pub fn occluded_counted(&self, ray: &Ray, counts: &mut Counts) -> bool {
+    /// [`occluded_with`](Self::occluded_with) that adds what it did to `counts`.
+    pub fn occluded_counted(&self, ray: &Ray, options: &QueryOptions, counts: &mut Counts) -> bool {
         let Some(ray) = ray.prepare() else { return false };
-        let query = Any::new(self.filter(&QueryOptions::default()), &ray);
+        let query = Any::new(self.filter(options), &ray);
         self.ask(&ray, &mut Counted { query, counts })
     }
 

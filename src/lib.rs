@@ -78,7 +78,7 @@ pub use build::{
 pub use error::{BuildError, OpenError, Unsupported};
 #[cfg(feature = "alloc")]
 pub use owned::OwnedAccel;
-pub use query::{Counts, Facing, PrimId, QueryOptions};
+pub use query::{Counts, Facing, Precision, PrimId, QueryOptions};
 pub use ray::{Hit, NONE, Ray};
 pub use scene::{Mesh, Scene, SphereSet, Strided};
 pub use surface::Surface;

@@ -19,6 +19,18 @@ pub enum Facing {
     Back,
 }
 
+/// How right an answer must be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// Hit or miss, which primitive and which order as in real arithmetic; `t` is the nearest float;
+    /// the same bits from every structure and on every machine.
+    #[default]
+    Exact,
+    /// In `f32`, for the last per cent of speed and for processors without `f64`: nothing that the ray
+    /// hits is missed, and `t` is within a stated bound.
+    Watertight,
+}
+
 /// A primitive by its numbers, as they stand in a [`Hit`](crate::Hit).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrimId {
@@ -33,6 +45,8 @@ pub struct PrimId {
 /// What one query may leave out. The default leaves out nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct QueryOptions {
+    /// How right the answer must be.
+    pub precision: Precision,
     /// A geometry is seen when its mask and this one share a bit, or when either is zero.
     pub mask: u32,
     /// The sides of surfaces that count.
@@ -51,6 +65,12 @@ pub struct Counts {
     pub blocks: u64,
     /// Triangles and spheres tested.
     pub tests: u64,
+    /// Meetings whose `t` was computed in `f64`.
+    pub intervals: u64,
+    /// Decisions that took real arithmetic.
+    pub exact: u64,
+    /// Final `t` whose rounding took real arithmetic.
+    pub roundings: u64,
 }
 
 /// A primitive that the ray meets within its limits.

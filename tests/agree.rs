@@ -6,7 +6,7 @@ mod common;
 
 use common::{All, agreed, bits, odd_models};
 use proptest::prelude::*;
-use raykern::{Facing, Mesh, NONE, PrimId, QueryOptions, Ray, Scene, SphereSet};
+use raykern::{Facing, Mesh, NONE, Precision, PrimId, QueryOptions, Ray, Scene, SphereSet};
 use raykern_harness::load::load;
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
@@ -104,6 +104,7 @@ fn options() -> impl Strategy<Value = QueryOptions> {
     let facing = prop_oneof![Just(Facing::Both), Just(Facing::Front), Just(Facing::Back)];
     let skip = prop::option::of((0u32..30, 0u32..5));
     (0u32..4, facing, skip).prop_map(|(mask, facing, skip)| QueryOptions {
+        precision: Precision::Exact,
         mask,
         facing,
         skip: skip.map(|(prim, geometry)| PrimId { prim, geometry, instance: NONE }),

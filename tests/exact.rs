@@ -5,7 +5,7 @@
 mod common;
 
 use common::{All, agreed, odd_models};
-use raykern::{Facing, Hit, Mesh, NONE, PrimId, QueryOptions, Ray, Scene, SphereSet};
+use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Ray, Scene, SphereSet};
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
@@ -85,7 +85,7 @@ fn options_are_answered_exactly() {
             let skip = first.filter(|_| random.below(2) == 0);
             let skip =
                 skip.map(|Hit { prim, geometry, .. }| PrimId { prim, geometry, instance: NONE });
-            let options = QueryOptions { mask, facing, skip };
+            let options = QueryOptions { precision: Precision::Exact, mask, facing, skip };
             let hit = common::agreed(&all.accels(), &ray, &options);
             let judgement = oracle.judge(&ray, &options, hit);
             assert_eq!(judgement, Judgement::Right, "{ray:?} {options:?} {hit:?}");

@@ -5,12 +5,13 @@
 mod common;
 
 use common::{All, agreed, odd_models};
-use raykern::{Facing, Hit, Mesh, NONE, PrimId, QueryOptions, Ray, Scene, SphereSet};
+use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Ray, Scene, SphereSet};
 use raykern_harness::make;
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
 
-const ALL: QueryOptions = QueryOptions { mask: 0, facing: raykern::Facing::Both, skip: None };
+const ALL: QueryOptions =
+    QueryOptions { precision: Precision::Exact, mask: 0, facing: Facing::Both, skip: None };
 const DOWN: [f32; 3] = [0.0, 0.0, -1.0];
 
 fn ask(all: &All, ray: Ray) -> Option<Hit> {

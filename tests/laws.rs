@@ -5,12 +5,13 @@
 mod common;
 
 use common::{All, agreed, bits};
-use raykern::{Facing, Hit, QueryOptions, Ray};
+use raykern::{Facing, Hit, Precision, QueryOptions, Ray};
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::rays::{Family, RayMaker};
 
-const ALL: QueryOptions = QueryOptions { mask: 0, facing: Facing::Both, skip: None };
+const ALL: QueryOptions =
+    QueryOptions { precision: Precision::Exact, mask: 0, facing: Facing::Both, skip: None };
 
 /// Answers of `changed` to `map`ped rays, brought back by `back`, equal those of `model`.
 fn law(

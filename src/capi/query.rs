@@ -8,7 +8,7 @@ use super::types::{
 use super::versioned::{self, Output, pointer};
 use super::{accel_at, answer, guard};
 use crate::accel::Accel;
-use crate::query::{Facing, PrimId, QueryOptions};
+use crate::query::{Facing, Precision, PrimId, QueryOptions};
 use crate::ray::{Hit, Ray};
 use crate::surface::Surface;
 
@@ -301,11 +301,12 @@ impl RtQuery {
             }),
             _ => return Err(Error::InvalidArgument),
         };
-        match self.precision {
-            RT_PRECISION_EXACT => Ok(QueryOptions { mask: self.mask, facing, skip }),
-            RT_PRECISION_WATERTIGHT => Err(Error::Unsupported),
-            _ => Err(Error::InvalidArgument),
-        }
+        let precision = match self.precision {
+            RT_PRECISION_EXACT => Precision::Exact,
+            RT_PRECISION_WATERTIGHT => Precision::Watertight,
+            _ => return Err(Error::InvalidArgument),
+        };
+        Ok(QueryOptions { precision, mask: self.mask, facing, skip })
     }
 }
 

@@ -32,7 +32,8 @@ pub const RT_PLAIN_LIST_ALWAYS: u32 = 2;
 /// `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
 /// same answer from every structure; `t` is the nearest float.
 pub const RT_PRECISION_EXACT: u32 = 0;
-/// No ray slips through a closed mesh. Unsupported so far.
+/// In single precision: nothing that the ray hits is missed, so no ray slips through a closed mesh;
+/// `t` is within a bound that docs/METHODS.md states; structures may differ in what they answer.
 pub const RT_PRECISION_WATERTIGHT: u32 = 1;
 
 /// `RtQuery.facing`: both sides of every surface.

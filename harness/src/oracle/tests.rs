@@ -1,6 +1,6 @@
 //! Cases with known answers, and laws.
 
-use raykern::{Hit, NONE, PrimId};
+use raykern::{Hit, NONE, Precision, PrimId};
 
 use super::*;
 use crate::make::{self, Random};
@@ -17,7 +17,8 @@ fn model() -> Model {
     }
 }
 
-const ALL: QueryOptions = QueryOptions { mask: 0, facing: Facing::Both, skip: None };
+const ALL: QueryOptions =
+    QueryOptions { precision: Precision::Exact, mask: 0, facing: Facing::Both, skip: None };
 const DOWN: [f32; 3] = [0.0, 0.0, -1.0];
 
 fn answer(ray: Ray, options: QueryOptions) -> Option<(u32, u32, f32)> {
@@ -59,7 +60,7 @@ fn limits_are_inclusive_and_compared_with_the_real_t() {
 #[test]
 fn options_leave_out() {
     let ray = Ray::new([0.0, 0.0, 1.0], DOWN);
-    let with = |mask, facing| answer(ray, QueryOptions { mask, facing, skip: None });
+    let with = |mask, facing| answer(ray, QueryOptions { mask, facing, ..ALL });
     assert_eq!(with(2, Facing::Both), Some((1, 0, 5.0)));
     assert_eq!(with(4, Facing::Both), None);
     assert_eq!(with(3, Facing::Front), Some((0, 0, 1.0)));

@@ -12,7 +12,7 @@ mod shade;
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use raykern::{Accel, Counts, Hit, Ray};
+use raykern::{Accel, Counts, Hit, QueryOptions, Ray};
 
 pub use self::camera::{Camera, CameraError};
 pub use self::image::{Image, ImageError, read_png};
@@ -64,11 +64,11 @@ impl<'a> Counting<'a> {
 
 impl Tracer for Counting<'_> {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.count(|counts| self.accel.intersect_counted(ray, counts))
+        self.count(|counts| self.accel.intersect_counted(ray, &QueryOptions::default(), counts))
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.count(|counts| self.accel.occluded_counted(ray, counts))
+        self.count(|counts| self.accel.occluded_counted(ray, &QueryOptions::default(), counts))
     }
 }
 
