@@ -1,17 +1,18 @@
 //! The face of a built structure.
 
-use crate::block::{Block, Header, KIND_BVH, KIND_GRID, KIND_LIST};
+use crate::block::{Block, KIND_BVH, KIND_GRID, KIND_LIST};
+use crate::bvh;
 use crate::error::OpenError;
+use crate::grid::{self, Cells};
 use crate::prim::{self, Leaves};
 use crate::query::{
-    Any, Candidate, Closest, Counted, Counts, Filter, Locate, PrimId, Query, QueryOptions,
-    flat_number, geometry_of,
+    Any, Closest, Counts, Decide, Exact, Filter, Locate, Meets, Precision, PrimId, Query,
+    QueryOptions, Watch, Watertight, flat_number, geometry_of,
 };
-use crate::ray::{Hit, NONE, PreparedRay, Ray};
+use crate::ray::{Hit, NONE, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
 #[cfg(feature = "capi")]
 use crate::storage;
 use crate::surface::{self, Surface};
-use crate::{bvh, grid};
 
 /// What a block holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,17 +154,12 @@ impl<'m> Accel<'m> {
 
     /// The closest hit among what `options` leaves.
     pub fn intersect_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        let ray = ray.prepare()?;
-        let mut query = Closest::new(self.filter(options), &ray);
-        self.ask(&ray, &mut query);
-        query.best.map(|best| self.hit(&ray, &best))
+        self.intersect_watched(ray, options, ())
     }
 
     /// Whether anything that `options` leaves is hit.
     pub fn occluded_with(&self, ray: &Ray, options: &QueryOptions) -> bool {
-        let Some(ray) = ray.prepare() else { return false };
-        let mut query = Any::new(self.filter(options), &ray);
-        self.ask(&ray, &mut query)
+        self.occluded_watched(ray, options, ())
     }
 
     /// [`intersect`](Self::intersect) for each ray; a miss is written as [`Hit::MISS`]. Stops at the
@@ -188,18 +184,52 @@ impl<'m> Accel<'m> {
         options: &QueryOptions,
         counts: &mut Counts,
     ) -> Option<Hit> {
-        let ray = ray.prepare()?;
-        let query = Closest::new(self.filter(options), &ray);
-        let mut counted = Counted { query, counts };
-        self.ask(&ray, &mut counted);
-        counted.query.best.map(|best| self.hit(&ray, &best))
+        self.intersect_watched(ray, options, counts)
     }
 
     /// [`occluded_with`](Self::occluded_with) that adds what it did to `counts`.
     pub fn occluded_counted(&self, ray: &Ray, options: &QueryOptions, counts: &mut Counts) -> bool {
-        let Some(ray) = ray.prepare() else { return false };
-        let query = Any::new(self.filter(options), &ray);
-        self.ask(&ray, &mut Counted { query, counts })
+        self.occluded_watched(ray, options, counts)
+    }
+
+    fn intersect_watched(
+        &self,
+        ray: &Ray,
+        options: &QueryOptions,
+        watch: impl Watch,
+    ) -> Option<Hit> {
+        let ray = self.prepare(ray)?;
+        match options.precision {
+            Precision::Exact => self.closest::<Exact>(&ray, options, watch),
+            Precision::Watertight => self.closest::<Watertight>(&ray, options, watch),
+        }
+    }
+
+    fn occluded_watched(&self, ray: &Ray, options: &QueryOptions, watch: impl Watch) -> bool {
+        let Some(ray) = self.prepare(ray) else { return false };
+        let filter = self.filter(options);
+        match options.precision {
+            Precision::Exact => self.ask(&ray, &mut Any::<Exact, _>::new(filter, &ray, watch)),
+            Precision::Watertight => {
+                self.ask(&ray, &mut Any::<Watertight, _>::new(filter, &ray, watch))
+            }
+        }
+    }
+
+    fn prepare(&self, ray: &Ray) -> Option<PreparedRay> {
+        ray.prepare(self.0.header.reach)
+    }
+
+    fn closest<D: Decide>(
+        &self,
+        ray: &PreparedRay,
+        options: &QueryOptions,
+        watch: impl Watch,
+    ) -> Option<Hit> {
+        let mut query = Closest::<D, _>::new(self.filter(options), ray, watch);
+        self.ask(ray, &mut query);
+        let best = query.best?;
+        Some(self.hit::<D>(ray, &best, query.watch()))
     }
 
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when
@@ -208,31 +238,45 @@ impl<'m> Accel<'m> {
     /// The block keeps no way from a primitive's number to its place, so this follows the ray once
     /// more: it costs about as much as the intersect call did.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
-        let ray = ray.prepare()?;
+        let ray = self.prepare(ray)?;
         let Hit { prim, geometry, instance, .. } = *hit;
         let id = PrimId { prim, geometry, instance };
-        let Header { triangle_limit, prim_limit, .. } = *self.0.header;
-        let number = flat_number(&id, self.0.geometries, prim_limit)?;
-        let mut query = Locate::new(number, hit.t, &ray);
-        self.ask(&ray, &mut query);
-        let found = query.found?;
-        let (block, lane) = (found.place.0 as usize, found.place.1 as usize);
-        Some(if number < triangle_limit {
-            surface::of_triangle(self.0.triangle_blocks.get(block)?.triangle(lane), found.weights)
-        } else {
-            let (centre, radius) = self.0.sphere_blocks.get(block)?.sphere(lane);
-            surface::of_sphere(&ray, found.t, centre, radius)
-        })
+        let number = flat_number(&id, self.0.geometries, self.0.header.prim_limit)?;
+        self.surface_of::<Exact>(&ray, number, hit.t)
+            .or_else(|| self.surface_of::<Watertight>(&ray, number, hit.t))
     }
 
-    /// Runs the one traversal of the structure at hand.
+    /// The surface at the hit with this flat number and `t` in one precision.
+    fn surface_of<D: Decide>(&self, ray: &PreparedRay, number: u32, t: f32) -> Option<Surface> {
+        let mut query = Locate::<D>::new(number, t, ray);
+        self.ask(ray, &mut query);
+        let found = query.found?;
+        let (block, lane) = (found.place().0 as usize, found.place().1 as usize);
+        if number < self.0.header.triangle_limit {
+            let corners = self.0.triangle_blocks.get(block)?.triangle(lane);
+            return Some(surface::of_triangle(ray, corners));
+        }
+        let (centre, radius) = self.0.sphere_blocks.get(block)?.sphere(lane);
+        Some(surface::of_sphere(ray, D::fine_t(ray, &found), centre, radius))
+    }
+
+    /// Runs the one traversal of the structure at hand, with boxes in `f32` where the frame allows.
     fn ask<Q: Query>(&self, ray: &PreparedRay, query: &mut Q) -> bool {
-        let Block { header, grids, nodes, words, runs, .. } = self.0;
+        if let (KIND_GRID, Some(head)) = (self.0.header.kind, self.0.grids.first()) {
+            let Block { words, runs, .. } = self.0;
+            return grid::walk(&Cells { head, words, runs, leaves: self.leaves() }, ray, query);
+        }
+        match NarrowSlab::new(ray) {
+            Some(slab) => self.ask_boxes(ray, &slab, query),
+            None => self.ask_boxes(ray, &WideSlab::new(ray), query),
+        }
+    }
+
+    fn ask_boxes<Q: Query>(&self, ray: &PreparedRay, slab: &impl Slab, query: &mut Q) -> bool {
         let leaves = self.leaves();
-        match (header.kind, grids.first()) {
-            (KIND_BVH, _) => bvh::traverse(nodes, &leaves, ray, query),
-            (KIND_GRID, Some(grid)) => grid::walk(grid, words, runs, &leaves, ray, query),
-            _ => leaves.intersect_all(ray, query),
+        match self.0.header.kind {
+            KIND_BVH => bvh::traverse(self.0.nodes, &leaves, ray, slab, query),
+            _ => leaves.intersect_all(ray, slab, query),
         }
     }
 
@@ -245,22 +289,12 @@ impl<'m> Accel<'m> {
         Filter::new(options, self.0.geometries, self.0.header.prim_limit)
     }
 
-    /// The record of a candidate that won.
-    fn hit(&self, ray: &PreparedRay, best: &Candidate) -> Hit {
-        let place = geometry_of(best.prim, self.0.geometries);
+    /// The record of the meeting that won.
+    fn hit<D: Decide>(&self, ray: &PreparedRay, best: &D::Met, watch: &mut impl Watch) -> Hit {
+        let place = geometry_of(best.prim(), self.0.geometries);
         let (geometry, first) = place.map_or((NONE, 0), |(number, g)| (number, g.first));
-        let [u, v] = rounded_weights(best.weights);
-        // Adding +0 turns -0 into +0.
-        let t = best.rounded_t(ray) + 0.0;
-        Hit { t, u, v, prim: best.prim - first, geometry, instance: NONE }
+        let [u, v] = D::weights(ray, best);
+        let t = D::t(ray, best, watch);
+        Hit { t, u, v, prim: best.prim() - first, geometry, instance: NONE }
     }
-}
-
-/// The weights of the second and third vertex as floats, such that neither they nor `1 - u - v` are
-/// negative: each is the nearest float to its value in `f64`, and `v` gives way.
-#[expect(clippy::manual_clamp, reason = "`clamp` panics on the NaN that foreign blocks can give")]
-fn rounded_weights([u, v]: [f64; 2]) -> [f32; 2] {
-    let u = (u as f32).max(0.0).min(1.0) + 0.0;
-    let v = (v as f32).max(0.0).min(1.0 - u) + 0.0;
-    [u, v]
 }

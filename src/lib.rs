@@ -60,6 +60,7 @@ mod capi;
 mod error;
 mod exact;
 mod grid;
+mod interval;
 mod list;
 mod math;
 #[cfg(feature = "alloc")]

@@ -2,9 +2,10 @@
 
 use glam::DVec3;
 
+use crate::exact::Line;
+use crate::interval::{sphere, triangle};
 use crate::math::rounding::{UNIT, f32_above, f32_below};
 use crate::math::wide;
-use crate::prim;
 use crate::ray::PreparedRay;
 
 /// The surface at a hit, in world space.
@@ -22,18 +23,21 @@ pub struct Surface {
     pub back_origin: [f32; 3],
 }
 
-/// The surface of a triangle at the point with these weights of the second and third vertex.
-pub(crate) fn of_triangle(triangle: [[f32; 3]; 3], [u, v]: [f64; 2]) -> Surface {
-    let [a, b, c] = triangle.map(wide);
+/// The surface of a triangle where the ray meets it.
+pub(crate) fn of_triangle(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Surface {
+    let line = Line { origin: ray.given.origin, direction: ray.given.direction };
+    let [u, v] = triangle::weights(&line, corners);
+    let [a, b, c] = corners.map(wide);
     // Whatever the error of the weights, the point lies in the plane.
     let point = a + u * (b - a) + v * (c - a);
     let size = a.abs().max(b.abs()).max(c.abs()).max_element();
-    at(point, size, prim::normal(triangle))
+    at(point, size, triangle::normal(corners))
 }
 
 /// The surface of a sphere at `t` along the ray.
 pub(crate) fn of_sphere(ray: &PreparedRay, t: f64, centre: [f32; 3], radius: f32) -> Surface {
-    let normal = prim::surface_normal(ray.origin + t * ray.direction, centre);
+    let normal =
+        sphere::surface_normal(wide(ray.given.origin) + t * wide(ray.given.direction), centre);
     let centre = wide(centre);
     let radius = f64::from(radius);
     at(centre + radius * normal, centre.abs().max_element() + radius, normal)

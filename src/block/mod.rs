@@ -26,7 +26,7 @@ use crate::storage::{self, Plain, align_up};
 const MAGIC: [u8; 8] = *b"raykern\0";
 const BYTE_ORDER: u32 = 0x0102_0304;
 /// Counted up whenever the bytes of a block change their meaning.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 pub(crate) const KIND_LIST: u32 = 1;
 pub(crate) const KIND_GRID: u32 = 2;
@@ -54,7 +54,7 @@ pub(crate) struct Counts {
 /// byte 0        8            12        16     24     28       32      56
 ///      | magic | byte order | version | size | kind | layout | bounds | ...
 /// byte 56           60                64          68
-///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reserved |
+///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reach | reserved |
 /// byte 88       120        128
 ///      | counts | reserved |
 /// ```
@@ -77,7 +77,9 @@ pub(crate) struct Header {
     pub triangle_count: u32,
     pub sphere_count: u32,
     pub ignored_count: u32,
-    reserved: [u32; 2],
+    /// The largest coordinate of `bounds`, infinite where it is not representable.
+    pub reach: f32,
+    reserved: u32,
     pub counts: Counts,
     reserved_too: [u32; 2],
 }
@@ -229,7 +231,8 @@ impl Header {
             triangle_count: census.triangle_count,
             sphere_count: census.sphere_count,
             ignored_count: census.ignored_count,
-            reserved: [0; 2],
+            reach: census.bounds.reach(),
+            reserved: 0,
             counts,
             reserved_too: [0; 2],
         }

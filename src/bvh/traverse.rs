@@ -3,8 +3,8 @@
 use super::MAX_DEPTH;
 use crate::block::BvhNode;
 use crate::prim::Leaves;
-use crate::query::Query;
-use crate::ray::PreparedRay;
+use crate::query::{Query, Watch};
+use crate::ray::{PreparedRay, Slab};
 
 /// Offers `query` everything the ray meets, near nodes first; true when it ended the search.
 ///
@@ -14,12 +14,13 @@ pub(crate) fn traverse<Q: Query>(
     nodes: &[BvhNode],
     leaves: &Leaves,
     ray: &PreparedRay,
+    slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     let mut stack = Stack { entries: [(0, 0.0); MAX_DEPTH], count: 0 };
     let Some(mut node) = nodes.first() else { return false };
-    query.saw_step();
-    if ray.slab(&node.aabb(), query.t_bound()).is_empty() {
+    query.watch().step();
+    if slab.part(&node.aabb(), query.t_bound()).is_empty() {
         return false;
     }
     loop {
@@ -27,7 +28,7 @@ pub(crate) fn traverse<Q: Query>(
             if leaves.intersect(node.leaf(), ray, query) {
                 return true;
             }
-        } else if let Some(child) = nearer_child(nodes, node.first, ray, query, &mut stack) {
+        } else if let Some(child) = nearer_child(nodes, node.first, slab, query, &mut stack) {
             node = child;
             continue;
         }
@@ -42,15 +43,15 @@ pub(crate) fn traverse<Q: Query>(
 fn nearer_child<'n, Q: Query>(
     nodes: &'n [BvhNode],
     first: u32,
-    ray: &PreparedRay,
+    slab: &impl Slab,
     query: &mut Q,
     stack: &mut Stack,
 ) -> Option<&'n BvhNode> {
     let [left, right] = nodes.get(first as usize..)?.first_chunk::<2>()?;
-    query.saw_step();
-    query.saw_step();
+    query.watch().step();
+    query.watch().step();
     let t_bound = query.t_bound();
-    let (a, b) = (ray.slab(&left.aabb(), t_bound), ray.slab(&right.aabb(), t_bound));
+    let (a, b) = (slab.part(&left.aabb(), t_bound), slab.part(&right.aabb(), t_bound));
     match (a.is_empty(), b.is_empty()) {
         (true, true) => None,
         (false, true) => Some(left),
@@ -68,12 +69,12 @@ fn nearer_child<'n, Q: Query>(
 
 /// Nodes to come back to, each with the `t` at which the ray enters it.
 struct Stack {
-    entries: [(u32, f64); MAX_DEPTH],
+    entries: [(u32, f32); MAX_DEPTH],
     count: usize,
 }
 
 impl Stack {
-    fn push(&mut self, node: u32, near: f64) {
+    fn push(&mut self, node: u32, near: f32) {
         if let Some(entry) = self.entries.get_mut(self.count) {
             *entry = (node, near);
             self.count += 1;
@@ -81,7 +82,7 @@ impl Stack {
     }
 
     /// The last node pushed that the ray enters before `t_bound`.
-    fn pop(&mut self, t_bound: f64) -> Option<u32> {
+    fn pop(&mut self, t_bound: f32) -> Option<u32> {
         while let Some((node, near)) = self.entries[..self.count].last().copied() {
             self.count -= 1;
             if near <= t_bound {

@@ -12,12 +12,18 @@ mod triangle;
 use core::cmp::Ordering;
 
 pub(crate) use sphere::Roots;
-pub(crate) use triangle::{has_area, volumes};
+pub(crate) use triangle::{faces, has_area, volumes};
 
 use crate::math::expansion::Expansion;
-use crate::ray::PreparedRay;
 use sphere::Root;
 use triangle::Quotient;
+
+/// A line, as the floats that describe it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line {
+    pub origin: [f32; 3],
+    pub direction: [f32; 3],
+}
 
 /// What a ray meets.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +37,25 @@ pub(crate) enum Meeting {
     },
 }
 
+impl Meeting {
+    /// Whether the real `t` of both is equal for a reason that takes no arithmetic: the same vertices,
+    /// one axis-parallel plane, or one sphere.
+    pub fn surely_equal(&self, other: &Meeting) -> bool {
+        match (self, other) {
+            (Meeting::Triangle(a), Meeting::Triangle(b)) => {
+                let same = a.iter().all(|p| b.contains(p)) && b.iter().all(|p| a.contains(p));
+                let flat = |k: usize| a.iter().chain(b).all(|p| p[k] == a[0][k]);
+                same || (0..3).any(flat)
+            }
+            (
+                Meeting::Sphere { centre: c, radius: r, root: i },
+                Meeting::Sphere { centre: d, radius: s, root: j },
+            ) => c == d && r == s && i == j,
+            _ => false,
+        }
+    }
+}
+
 /// The real `t` of a meeting.
 #[expect(clippy::large_enum_variant, reason = "there is no allocator to make them equal")]
 pub(crate) enum Distance {
@@ -40,7 +65,7 @@ pub(crate) enum Distance {
 
 impl Distance {
     /// The distance of something that the ray's line meets; `None` when it does not.
-    pub fn new(ray: &PreparedRay, meeting: &Meeting) -> Option<Self> {
+    pub fn new(ray: &Line, meeting: &Meeting) -> Option<Self> {
         match *meeting {
             Meeting::Triangle(corners) => Quotient::new(ray, corners).map(Distance::Quotient),
             Meeting::Sphere { centre, radius, root } => {
@@ -68,8 +93,13 @@ impl Distance {
         }
     }
 
+    /// The order against a float.
+    pub fn compare_with(&self, x: f32) -> Ordering {
+        self.compare_with_wide(f64::from(x))
+    }
+
     /// The order against a float of at most 48 bits.
-    pub fn compare_with(&self, x: f64) -> Ordering {
+    fn compare_with_wide(&self, x: f64) -> Ordering {
         match self {
             Distance::Quotient(t) => t.compare_with(x),
             Distance::Root(t) => t.compare_with(x),
@@ -81,8 +111,8 @@ impl Distance {
         // Right but for the last step, since the approximation is.
         let near = self.approximate().0 as f32;
         let is_odd = near.to_bits() & 1 == 1;
-        let below = self.compare_with(midpoint(near.next_down(), near));
-        let above = self.compare_with(midpoint(near, near.next_up()));
+        let below = self.compare_with_wide(midpoint(near.next_down(), near));
+        let above = self.compare_with_wide(midpoint(near, near.next_up()));
         if below == Ordering::Less || (below == Ordering::Equal && is_odd) {
             near.next_down()
         } else if above == Ordering::Greater || (above == Ordering::Equal && is_odd) {
@@ -121,23 +151,21 @@ fn dot(p: &Vector, q: &Vector) -> Expansion {
 }
 
 /// Origin and direction as the floats they were given as.
-fn given(ray: &PreparedRay) -> ([f32; 3], Vector) {
-    let narrow = |v: glam::DVec3| v.to_array().map(|x| x as f32);
-    (narrow(ray.origin), difference(narrow(ray.direction), [0.0; 3]))
+fn given(ray: &Line) -> ([f32; 3], Vector) {
+    (ray.origin, difference(ray.direction, [0.0; 3]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::Ray;
 
-    fn quotient_of(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Distance {
+    fn quotient_of(ray: &Line, corners: [[f32; 3]; 3]) -> Distance {
         Distance::new(ray, &Meeting::Triangle(corners)).expect("not parallel")
     }
 
     fn quotient(z: f32, slope: f32) -> Distance {
         let triangle = [[0.0, 0.0, z], [1.0, 0.0, z + slope], [0.0, 1.0, z]];
-        let ray = Ray::new([0.0; 3], [0.0, 0.0, 3.0]).prepare().expect("a valid ray");
+        let ray = Line { origin: [0.0; 3], direction: [0.0, 0.0, 3.0] };
         quotient_of(&ray, triangle)
     }
 
@@ -146,7 +174,7 @@ mod tests {
         let third = quotient(1.0, 0.0);
         assert_eq!(third.compare(&quotient(1.0, 0.5)), Ordering::Equal);
         assert_eq!(third.compare(&quotient(1.0f32.next_up(), 0.5)), Ordering::Less);
-        assert_eq!(third.compare_with(1.0 / 3.0), Ordering::Greater);
+        assert_eq!(third.compare_with_wide(1.0 / 3.0), Ordering::Greater);
         assert_eq!(third.round(), 1.0 / 3.0);
     }
 
@@ -154,12 +182,11 @@ mod tests {
     fn midpoints_go_to_even() {
         // 3 t = z, with t in the middle of two floats.
         let t = 1.0 + f64::from(f32::EPSILON) / 2.0;
-        let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]).prepare().expect("a valid ray");
-        let far = Ray { origin: [0.0, 0.0, -1.0], ..Ray::new([0.0; 3], [0.0, 0.0, 1.0]) };
-        let far = far.prepare().expect("a valid ray");
+        let ray = Line { origin: [0.0; 3], direction: [0.0, 0.0, 1.0] };
+        let far = Line { origin: [0.0, 0.0, -1.0], ..ray };
         let z = (t - 1.0) as f32;
         let triangle = [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]];
-        assert_eq!(quotient_of(&far, triangle).compare_with(t), Ordering::Equal);
+        assert_eq!(quotient_of(&far, triangle).compare_with_wide(t), Ordering::Equal);
         assert_eq!(quotient_of(&far, triangle).round(), 1.0);
         assert_eq!(quotient_of(&ray, triangle).round(), z);
         let beside = triangle.map(|[x, y, z]| [x, y, z.next_up()]);

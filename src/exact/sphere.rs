@@ -6,11 +6,10 @@
 use core::cmp::Ordering;
 
 use super::triangle::Quotient;
-use super::{difference, dot, given};
+use super::{Line, difference, dot, given};
 use crate::math::expansion::Expansion;
 use crate::math::float::sqrt;
 use crate::math::rounding::UNIT;
-use crate::ray::PreparedRay;
 
 /// The two roots: where a ray's line enters and leaves a sphere.
 #[derive(Clone, Copy)]
@@ -24,7 +23,7 @@ pub(crate) struct Roots {
 
 impl Roots {
     /// The roots, or `None` when the line misses the sphere.
-    pub fn new(ray: &PreparedRay, centre: [f32; 3], radius: f32) -> Option<Self> {
+    pub fn new(ray: &Line, centre: [f32; 3], radius: f32) -> Option<Self> {
         let (o, d) = given(ray);
         let from_centre = difference(o, centre);
         let (a, b) = (dot(&d, &d), dot(&from_centre, &d));

@@ -2,14 +2,13 @@
 
 use core::cmp::Ordering;
 
-use super::{cross, difference, dot, given};
+use super::{Line, cross, difference, dot, given};
 use crate::math::expansion::Expansion;
 use crate::math::rounding::UNIT;
-use crate::ray::PreparedRay;
 
 /// The volumes `d . (p x q)` over the edges opposite to the second, third and first vertex, half of
 /// what the triangle test computes in `f64`.
-pub(crate) fn volumes(ray: &PreparedRay, [a, b, c]: [[f32; 3]; 3]) -> [Expansion; 3] {
+pub(crate) fn volumes(ray: &Line, [a, b, c]: [[f32; 3]; 3]) -> [Expansion; 3] {
     let (o, d) = given(ray);
     let (ra, rb, rc) = (difference(a, o), difference(b, o), difference(c, o));
     [(&rc, &ra), (&ra, &rb), (&rb, &rc)].map(|(p, q)| dot(&d, &cross(p, q)))
@@ -23,7 +22,7 @@ pub(crate) struct Quotient {
 
 impl Quotient {
     /// The `t` at which the ray meets the plane of a triangle; `None` when it is parallel to it.
-    pub fn new(ray: &PreparedRay, [a, b, c]: [[f32; 3]; 3]) -> Option<Self> {
+    pub fn new(ray: &Line, [a, b, c]: [[f32; 3]; 3]) -> Option<Self> {
         let (o, d) = given(ray);
         let n = cross(&difference(b, a), &difference(c, a));
         let (dividend, divisor) = (dot(&difference(a, o), &n), dot(&d, &n));
@@ -53,6 +52,12 @@ impl Quotient {
         let one = Expansion::difference(1.0, 0.0);
         Expansion::cross(&self.dividend, &one, &x, &self.divisor).sign()
     }
+}
+
+/// Whether the line comes from the side where the vertices run counter-clockwise.
+pub(crate) fn faces(ray: &Line, [a, b, c]: [[f32; 3]; 3]) -> bool {
+    let (_, d) = given(ray);
+    dot(&d, &cross(&difference(b, a), &difference(c, a))).sign() == Ordering::Less
 }
 
 /// Whether the triangle has area.

@@ -1,13 +1,16 @@
 //! A regular grid in flat arrays: which cells a box reaches, and which a ray.
 
 mod build;
+mod cells;
 mod plan;
+mod steps;
+mod sweep;
 mod validate;
 mod walk;
 
 pub(crate) use build::{build, needs};
 pub(crate) use validate::grid_is_sound;
-pub(crate) use walk::walk;
+pub(crate) use walk::{Cells, walk};
 
 use glam::DVec3;
 
@@ -16,7 +19,7 @@ use crate::math::Aabb;
 
 /// Primitives are put into every cell that their box comes nearer to than this part of a cell.
 ///
-/// Stepping errs by less (see [`walk`]), so a ray never leaves the cells in which a primitive that
+/// Stepping errs by less (see [`steps`]), so a ray never leaves the cells in which a primitive that
 /// it meets is listed.
 const DILATION: f64 = 1.0 / 1024.0;
 

@@ -47,6 +47,12 @@ impl Aabb {
         (wide(self.upper) - wide(self.lower)).min(DVec3::splat(1e39)).max(DVec3::ZERO)
     }
 
+    /// The largest coordinate in size; 0 for the empty box.
+    pub fn reach(&self) -> f32 {
+        let corners = self.lower.into_iter().chain(self.upper);
+        if self.lower[0] > self.upper[0] { 0.0 } else { corners.fold(0.0, |m, x| x.abs().max(m)) }
+    }
+
     /// Half the surface area.
     pub fn half_area(&self) -> f64 {
         let e = self.extent();

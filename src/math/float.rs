@@ -9,3 +9,21 @@ pub(crate) fn sqrt(x: f64) -> f64 {
     #[cfg(not(feature = "std"))]
     return libm::sqrt(x);
 }
+
+/// The correctly rounded square root of an `f32`.
+pub(crate) fn sqrt32(x: f32) -> f32 {
+    #[cfg(feature = "std")]
+    return std::primitive::f32::sqrt(x);
+    #[cfg(not(feature = "std"))]
+    return libm::sqrtf(x);
+}
+
+/// `2^n`, for `-149 <= n <= 127`: below -126 it is subnormal.
+pub(crate) const fn power_of_two(n: i32) -> f32 {
+    if n < -126 { f32::from_bits(1 << (n + 149)) } else { f32::from_bits(((n + 127) as u32) << 23) }
+}
+
+/// `2^n`, for `-1022 <= n <= 1023`.
+pub(crate) const fn wide_power_of_two(n: i32) -> f64 {
+    f64::from_bits(((n + 1023) as u64) << 52)
+}

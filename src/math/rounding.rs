@@ -3,6 +3,9 @@
 /// The unit roundoff of `f64`: half the distance from 1 to the next float.
 pub(crate) const UNIT: f64 = f64::EPSILON / 2.0;
 
+/// The unit roundoff of `f32`.
+pub(crate) const UNIT32: f32 = f32::EPSILON / 2.0;
+
 /// The bound on the relative error of a product of `n` factors `1 + d`, each `|d| <= UNIT`.
 ///
 /// Source: \[Hig02\], lemma 3.1.

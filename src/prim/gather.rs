@@ -1,8 +1,8 @@
 //! The scene as a run of flat numbers: which primitives can be hit, and where they are.
 
-use super::triangle::has_area;
 use crate::block::{Census, Geometry};
 use crate::error::BuildError;
+use crate::interval::triangle::has_area;
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
 use crate::query::geometry_of;

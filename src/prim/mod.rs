@@ -8,14 +8,12 @@ mod validate;
 
 pub(crate) use gather::{Shape, Survey, for_each_prim, geometries, shape, survey};
 pub(crate) use pack::Packer;
-pub(crate) use sphere::surface_normal;
-pub(crate) use triangle::normal;
 pub(crate) use validate::leaves_are_sound;
 
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SphereBlock, TriangleBlock};
-use crate::exact::Meeting;
-use crate::query::{Candidate, Query};
-use crate::ray::PreparedRay;
+use crate::query::{Query, Watch};
+use crate::ray::{PreparedRay, Slab};
+use triangle::Depths;
 
 /// The leaf blocks of one accel.
 #[derive(Clone, Copy)]
@@ -39,10 +37,15 @@ impl Leaves<'_> {
     }
 
     /// Offers `query` what the ray meets in any block: the traversal of a plain list.
-    pub fn intersect_all<Q: Query>(&self, ray: &PreparedRay, query: &mut Q) -> bool {
+    pub fn intersect_all<Q: Query>(
+        &self,
+        ray: &PreparedRay,
+        slab: &impl Slab,
+        query: &mut Q,
+    ) -> bool {
         for (number, block) in self.triangle_blocks.iter().enumerate() {
-            query.saw_step();
-            let part = ray.slab(&block.aabb, query.t_bound());
+            query.watch().step();
+            let part = slab.part(&block.aabb, query.t_bound());
             if !part.is_empty()
                 && self.intersect_block(KIND_TRIANGLES, number, block.lanes(), ray, query)
             {
@@ -63,7 +66,7 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
-        query.saw_block(lanes.count_ones());
+        query.watch().block(lanes.count_ones());
         match kind {
             KIND_TRIANGLES => self
                 .triangle_blocks
@@ -85,20 +88,11 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
+        let depths = Depths::new(ray, query.t_bound());
         Lanes(lanes & block.lanes()).any(|lane| {
-            let triangle = block.triangle(lane);
-            let Some(hit) = triangle::intersect(ray, triangle) else { return false };
-            let candidate = Candidate {
-                t: hit.t,
-                t_error: hit.t_error,
-                meeting: Meeting::Triangle(triangle),
-                weights: hit.weights,
-                prim: self.prim_id(block.first, lane),
-                place: (number as u32, lane as u32),
-                front: hit.front,
-                skippable: true,
-            };
-            offer(&candidate, ray, query)
+            let (place, prim) = ((number as u32, lane as u32), self.prim_id(block.first, lane));
+            triangle::lane(ray, &depths, block, place, prim)
+                .is_some_and(|lane| query.triangle(ray, &lane))
         })
     }
 
@@ -110,23 +104,11 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
+        let t_bound = query.t_bound();
         Lanes(lanes & block.lanes()).any(|lane| {
-            let (centre, radius) = block.sphere(lane);
-            let Some(hit) = sphere::intersect(ray, centre, radius) else { return false };
-            (0..2).any(|root| {
-                let candidate = Candidate {
-                    t: hit.t[root],
-                    t_error: hit.t_error[root],
-                    meeting: Meeting::Sphere { centre, radius, root },
-                    weights: [0.0; 2],
-                    prim: self.prim_id(block.first, lane),
-                    place: (number as u32, lane as u32),
-                    front: root == 0,
-                    // A line that only touches meets front and back in one point.
-                    skippable: hit.touches || root == hit.nearest,
-                };
-                offer(&candidate, ray, query)
-            })
+            let (place, prim) = ((number as u32, lane as u32), self.prim_id(block.first, lane));
+            sphere::lane(ray, t_bound, block, place, prim)
+                .is_some_and(|lane| query.sphere(ray, &lane))
         })
     }
 
@@ -135,14 +117,6 @@ impl Leaves<'_> {
     fn prim_id(&self, first: u32, lane: usize) -> u32 {
         self.prim_ids.get(first as usize + lane).copied().unwrap_or(crate::ray::NONE)
     }
-}
-
-/// Offers what is within the ray's limits; what lies beyond the best hit so far is not looked at
-/// closely.
-fn offer<Q: Query>(candidate: &Candidate, ray: &PreparedRay, query: &mut Q) -> bool {
-    candidate.interval().near <= query.t_bound()
-        && candidate.is_within(ray)
-        && query.accept(candidate)
 }
 
 /// The numbers of the bits that are set, from the lowest.

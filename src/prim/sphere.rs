@@ -1,140 +1,75 @@
-//! Ray against sphere: filters in `f64`, and real arithmetic where they are unsure.
+//! The filter of spheres, in `f32`: it rejects what the ray surely does not meet.
 
-use glam::DVec3;
-
-use crate::exact::Roots;
-use crate::math::expansion::{two_product, two_sum};
-use crate::math::float::sqrt;
-use crate::math::rounding::UNIT;
-use crate::math::{sum_abs, wide};
+use crate::block::leaf::SphereBlock;
+use crate::math::float::sqrt32;
+use crate::math::rounding::UNIT32;
+use crate::query::SphereLane;
 use crate::ray::PreparedRay;
 
-/// Where a ray's line enters and leaves a sphere; `t[0] <= t[1]`.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SphereHit {
-    pub t: [f64; 2],
-    pub t_error: [f64; 2],
-    /// The root nearer to `t = 0`.
-    pub nearest: usize,
-    /// Whether both roots are one.
-    pub touches: bool,
+/// Far below every bound on squares in the frame, and far above what underflow can take away.
+const TINY: f32 = 1.0 / (1u128 << 100) as f32;
+
+fn sum_abs(v: [f32; 3]) -> f32 {
+    v[0].abs() + v[1].abs() + v[2].abs()
 }
 
-/// The meetings of the ray's line with the sphere's surface, whatever their `t`.
+fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
+    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
+}
+
+/// The sphere in a lane, unless the ray surely does not meet it within its limits and up to the
+/// bound.
 ///
-/// Exact: hit or miss is that of real arithmetic, for all finite inputs, and each `t` is within its
-/// error. The filter takes the discriminant at the point of the line nearest the centre, so that
-/// distance does not spoil it; the larger root comes from the quadratic formula and the smaller
-/// from their product, whose cancellation, when the ray starts on the surface, is carried out in
-/// twice the precision. What the filter cannot bound well is computed without error.
+/// The discriminant is taken at the point of the line nearest the centre, so that distance does not
+/// spoil it. Conservative for every finite sphere and prepared ray. No operation is fused.
 ///
-/// Source: \[HGA19\]; the bounds are derived in `docs/METHODS.md`.
-pub(crate) fn intersect(ray: &PreparedRay, centre: [f32; 3], radius: f32) -> Option<SphereHit> {
-    let d = ray.direction;
-    let r = f64::from(radius);
-    let v = ray.origin - wide(centre);
-    let a = d.length_squared();
-    let b = v.dot(d);
-    let l = v - d * (b / a);
+/// Source: \[HGA19\]; the bounds are those of the same computation in `f64`, with the unit of `f32`.
+pub(crate) fn lane(
+    ray: &PreparedRay,
+    t_bound: f32,
+    block: &SphereBlock,
+    place: (u32, u32),
+    prim: u32,
+) -> Option<SphereLane> {
+    let (centre, radius) = block.sphere(place.1 as usize);
+    let (d, r) = (ray.direction, radius * ray.scale);
+    let v = [0, 1, 2].map(|k| ray.origin[k] - centre[k] * ray.scale);
+    let (a, b) = (dot(d, d), dot(v, d));
+    let middle = -(b / a);
+    let l = [0, 1, 2].map(|k| v[k] + d[k] * middle);
     let (reach, near) = (sum_abs(v), sum_abs(l));
-    let discriminant = r * r - l.length_squared();
-    let unsure = 32.0 * UNIT * near * reach
-        + (16.0 * UNIT * reach) * (16.0 * UNIT * reach)
-        + 16.0 * UNIT * (near * near + r * r);
+    let unsure = 32.0 * UNIT32 * near * reach
+        + (16.0 * UNIT32 * reach) * (16.0 * UNIT32 * reach)
+        + 16.0 * UNIT32 * (near * near + r * r)
+        + TINY;
+    let discriminant = r * r - dot(l, l);
     if discriminant < -unsure {
         return None;
     }
-    let difference_is_exact =
-        (0..3).all(|k| two_sum(ray.origin[k], -f64::from(centre[k])).1 == 0.0);
-    let b_error = 8.0 * UNIT * reach * ray.direction_size;
-    let clear = difference_is_exact && unsure < discriminant / 1024.0 && b_error < b.abs() / 1024.0;
-    if !clear {
-        return exactly(ray, centre, radius);
+    // The line is inside for at most the radius on either side, as the direction is at least 1 long.
+    let half = r * (1.0 + 8.0 * UNIT32) + 32.0 * UNIT32 * (reach + r);
+    if middle - half > t_bound || middle + half < ray.t_min {
+        return None;
     }
-    let half_chord = sqrt(a * discriminant);
+    let half_chord = sqrt32(a * discriminant.max(0.0));
+    let most = sqrt32(a * (discriminant + unsure));
+    let least = sqrt32(a * (discriminant - unsure).max(0.0));
+    // The larger root from the formula, in which nothing cancels, the smaller one from their product.
     let q = -(b + half_chord.copysign(b));
-    // Half of the discriminant's relative error, and a few roundings.
-    let q_error = b_error + half_chord * (0.51 * unsure / discriminant + 8.0 * UNIT);
-    let (power, power_error) = power(v, r);
-    let (large, small) = (q / a, power / q);
-    let large_error = q_error / a + 8.0 * UNIT * large.abs();
-    let small_error =
-        (power_error + small.abs() * q_error) / q.abs() * 1.01 + 2.0 * UNIT * small.abs();
-    let backwards = large < small;
-    Some(SphereHit {
-        t: if backwards { [large, small] } else { [small, large] },
-        t_error: if backwards { [large_error, small_error] } else { [small_error, large_error] },
-        nearest: usize::from(b > 0.0),
-        touches: false,
+    let power = dot(v, v) - r * r;
+    let (large, small) = if q == 0.0 { (0.0, 0.0) } else { (q / a, power / q) };
+    // What rounding does to the product may not carry the root out of the sphere.
+    let small = small.max(middle - half).min(middle + half);
+    // Infinite where the line touches the sphere at its origin.
+    let from_power = 16.0 * UNIT32 * (reach * reach + r * r) / q.abs();
+    let t_error = (most - least) + 64.0 * UNIT32 * (reach + r) + from_power;
+    Some(SphereLane {
+        centre,
+        radius,
+        prim,
+        place,
+        t: if large < small { [large, small] } else { [small, large] },
+        t_error,
+        far_is_nearest: b > 0.0,
     })
-}
-
-/// The same, computed without error and rounded.
-fn exactly(ray: &PreparedRay, centre: [f32; 3], radius: f32) -> Option<SphereHit> {
-    let roots = Roots::new(ray, centre, radius)?;
-    let [(enter, enter_error), (leave, leave_error)] = roots.approximate();
-    Some(SphereHit {
-        t: [enter, leave],
-        t_error: [enter_error, leave_error],
-        nearest: roots.nearest(),
-        touches: roots.touch(),
-    })
-}
-
-/// `|v|^2 - r^2`, the power of a point, in twice the precision, and a bound on its error.
-fn power(v: DVec3, r: f64) -> (f64, f64) {
-    let products =
-        [two_product(v.x, v.x), two_product(v.y, v.y), two_product(v.z, v.z), two_product(-r, r)];
-    let (mut high, mut low) = (0.0, 0.0);
-    for (p, p_error) in products {
-        let (sum, error) = two_sum(high, p);
-        high = sum;
-        low += error + p_error;
-    }
-    let size = v.length_squared() + r * r;
-    let power = high + low;
-    (power, 32.0 * UNIT * UNIT * size + UNIT * power.abs())
-}
-
-/// The outward unit normal at `point`, which lies on the sphere up to rounding.
-pub(crate) fn surface_normal(point: DVec3, centre: [f32; 3]) -> DVec3 {
-    (point - wide(centre)).normalize_or_zero()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ray::Ray;
-
-    fn meet(origin: [f32; 3], direction: [f32; 3], radius: f32) -> Option<[f64; 2]> {
-        let ray = Ray::new(origin, direction).prepare().expect("a valid ray");
-        intersect(&ray, [0.0; 3], radius).map(|hit| hit.t)
-    }
-
-    #[test]
-    fn both_roots_in_order_whatever_the_direction() {
-        assert_eq!(meet([0.0, 0.0, 5.0], [0.0, 0.0, -2.0], 1.0), Some([2.0, 3.0]));
-        assert_eq!(meet([0.0, 0.0, 5.0], [0.0, 0.0, 2.0], 1.0), Some([-3.0, -2.0]));
-        assert_eq!(meet([0.0, 0.0, 0.5], [0.0, 0.0, 1.0], 1.0), Some([-1.5, 0.5]));
-        assert_eq!(meet([0.0; 3], [0.0, 3.0, 4.0], 10.0), Some([-2.0, 2.0]));
-    }
-
-    #[test]
-    fn a_tangent_touches_once() {
-        assert_eq!(meet([1.0, 0.0, -3.0], [0.0, 0.0, 1.0], 1.0), Some([3.0, 3.0]));
-        assert_eq!(meet([1.0, 0.0, 0.0], [0.0, 0.0, 1.0], 1.0), Some([0.0, 0.0]));
-        assert_eq!(meet([1.0f32.next_up(), 0.0, -3.0], [0.0, 0.0, 1.0], 1.0), None);
-    }
-
-    #[test]
-    fn a_ray_from_the_surface_keeps_its_small_root() {
-        // On the surface up to rounding: the power of the point is about 1e-8, exactly known.
-        let x = 0.6f32;
-        let y = 0.8f32;
-        let [near, far] = meet([x, y, 0.0], [1.0, 0.0, 0.0], 1.0).expect("a hit");
-        let power = f64::from(x) * f64::from(x) + f64::from(y) * f64::from(y) - 1.0;
-        let expected = -power / f64::from(x) / 2.0;
-        let small = if far.abs() < near.abs() { far } else { near };
-        assert!((small - expected).abs() < 1e-6 * expected.abs(), "{small} {expected}");
-    }
 }

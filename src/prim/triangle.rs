@@ -1,148 +1,143 @@
-//! Ray against triangle: filters in `f64`, and real arithmetic where they are unsure.
+//! The filter of triangles, in `f32`: it rejects what the ray surely does not meet.
 
-use core::cmp::Ordering;
-
-use glam::DVec3;
-
-use crate::exact::{self, Distance, Meeting};
-use crate::math::rounding::{UNIT, gamma};
-use crate::math::{sum_abs, wide};
+use crate::block::leaf::TriangleBlock;
+use crate::math::rounding::UNIT32;
+use crate::query::TriangleLane;
 use crate::ray::PreparedRay;
 
-/// Where a ray's line meets a triangle.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TriangleHit {
-    pub t: f64,
-    pub t_error: f64,
-    /// Weights of the second and the third vertex.
-    pub weights: [f64; 2],
-    pub front: bool,
+/// Far below every bound on coordinates in the frame, and far above what underflow can take away.
+const TINY: f32 = 1.0 / (1u128 << 100) as f32;
+
+/// The limits of one visit of a block, as depths of the sheared space.
+///
+/// The filter asks with the bound that held when the block was opened, whatever lanes before may have
+/// found since, so that all backends offer the same lanes.
+pub(crate) struct Depths {
+    low: f32,
+    high: f32,
+    /// What surely lies within both limits of the ray lies between these.
+    inside: [f32; 2],
 }
 
-/// The meeting of the ray's line with the closed triangle, whatever its `t`.
+impl Depths {
+    pub fn new(ray: &PreparedRay, t_bound: f32) -> Self {
+        // A product rounds once; infinite depths stay as they are.
+        let rate = ray.shear.depth_rate;
+        let lower = |t: f32| t * rate - (t * rate).abs() * (4.0 * UNIT32);
+        let upper = |t: f32| t * rate + (t * rate).abs() * (4.0 * UNIT32);
+        Depths {
+            low: lower(ray.t_min),
+            high: upper(t_bound),
+            inside: [upper(ray.t_inside[0]), lower(ray.t_inside[1])],
+        }
+    }
+}
+
+/// A vertex in the sheared space: the ray is the line x = y = 0, and depth grows along it.
+#[derive(Clone, Copy)]
+struct Sheared {
+    x: f32,
+    y: f32,
+    /// Depth from the frame's zero, without rounding.
+    raw: f32,
+    /// Depth from the ray's origin.
+    depth: f32,
+}
+
+fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
+    let shear = &ray.shear;
+    let [kx, ky, kz] = shear.axes;
+    let raw = vertex[kz] * (ray.scale * shear.depth_sign);
+    let depth = raw - ray.origin[kz] * shear.depth_sign;
+    Sheared {
+        x: (vertex[kx] * ray.scale - ray.origin[kx]) - shear.slope[0] * depth,
+        y: (vertex[ky] * ray.scale - ray.origin[ky]) - shear.slope[1] * depth,
+        raw,
+        depth,
+    }
+}
+
+/// What is left of a lane after the filter.
+#[derive(Clone, Copy)]
+struct Sieved {
+    sure: bool,
+    inside: bool,
+    front: bool,
+    nearest: f32,
+    t: f32,
+    weights: [f32; 2],
+}
+
+/// The filter for one triangle; `None` only when the ray does not meet it within its limits and up to
+/// the bound.
 ///
-/// Exact: hit or miss and the side are those of real arithmetic, for all finite inputs. `t` is within
-/// `t_error`. A ray parallel to the plane misses.
+/// Conservative for every finite triangle and prepared ray, and `sure` and `inside` are only said of
+/// what is so in real arithmetic. All bounds are for this lane alone: they grow with the triangle's
+/// own size in the sheared plane and its own depth, not with the block's. No operation is fused, so
+/// every backend computes the same bits. `docs/METHODS.md` derives the constants.
 ///
-/// The sign of `d . (p x q)` says on which side of the edge from `p` to `q`, both relative to the
-/// origin, the line passes. It is computed as `d . ((p + q) x (q - p)) / 2`, whose error grows with
-/// the edge and not with the distance: eight roundings, of products whose sums are at most
-/// `|d| (|p| + |q|) |q - p|` in the norm of absolute sums. What is not larger than that bound is
-/// computed again without error.
-///
-/// Source: \[DEG12\]; filter and exact part after \[She97\].
-pub(crate) fn intersect(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<TriangleHit> {
-    let [a, b, c] = triangle.map(wide);
-    let o = ray.origin;
-    let (ra, rb, rc) = (a - o, b - o, c - o);
-    let (ab, bc, ca) = (b - a, c - b, a - c);
-    let edge = |p: DVec3, q: DVec3, pq: DVec3| ray.direction.dot((p + q).cross(pq));
-    let (u, v, w) = (edge(rc, ra, ca), edge(ra, rb, ab), edge(rb, rc, bc));
-    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-    let reach = sum_abs(ra).max(sum_abs(rb)).max(sum_abs(rc));
-    let side = sum_abs(ab).max(sum_abs(bc)).max(sum_abs(ca));
-    let bound = gamma(10) * ray.direction_size * 2.0 * reach * side;
-    if least < -bound && most > bound {
+/// Source: \[WBW13\] for the shear; the bounds are our own.
+fn sieve(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Option<Sieved> {
+    let [a, b, c] = corners.map(|vertex| sheared(ray, vertex));
+    let nearest_depth = a.depth.min(b.depth).min(c.depth);
+    let farthest_depth = a.depth.max(b.depth).max(c.depth);
+    let slack = 2.0 * UNIT32;
+    if nearest_depth - nearest_depth.abs() * slack > depths.high
+        || farthest_depth + farthest_depth.abs() * slack < depths.low
+    {
         return None;
     }
-    let sure = least > bound || most < -bound;
-    let [u, v, w] = if sure { [u, v, w] } else { exact_volumes(ray, triangle)? };
-    let (t, t_error) = plane(ray, triangle)?;
-    let sum = u + v + w;
-    Some(TriangleHit { t, t_error, weights: [u / sum, v / sum], front: sum < 0.0 })
+    // Twice the areas that the ray's point spans with the edges, each over the vertex opposite to it.
+    let area = |p: &Sheared, q: &Sheared| p.x * q.y - p.y * q.x;
+    let (over_a, over_b, over_c) = (area(&b, &c), area(&c, &a), area(&a, &b));
+    let in_plane = |v: &Sheared| v.x.abs().max(v.y.abs());
+    let size = in_plane(&a).max(in_plane(&b)).max(in_plane(&c));
+    let deepest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
+    // The error of a coordinate, and that of an area.
+    let shift = UNIT32 * (2.5 * size + 5.5 * ray.shear.steepness * deepest);
+    let area_error = shift * (4.0 * size + 2.0 * shift) + 4.5 * UNIT32 * (size * size) + TINY;
+    let least = over_a.min(over_b).min(over_c);
+    let most = over_a.max(over_b).max(over_c);
+    if least < -area_error && most > area_error {
+        return None;
+    }
+    let sure = least > area_error || most < -area_error;
+    let total = over_a + over_b + over_c;
+    let size_of_total = total.abs();
+    // The depth of the meeting, from that of the first vertex, is `rise / size_of_total`.
+    let (to_b, to_c) = (b.raw - a.raw, c.raw - a.raw);
+    let rise = (over_b * to_b + over_c * to_c) * 1f32.copysign(total);
+    let span = to_b.abs().max(to_c.abs());
+    let error =
+        20.0 * area_error * span + 5.0 * UNIT32 * (a.depth.abs() + span) * size_of_total + TINY;
+    let beyond = |depth: f32| rise - (depth - a.depth) * size_of_total;
+    if beyond(depths.high) > error || beyond(depths.low) < -error {
+        return None;
+    }
+    let inside = sure && beyond(depths.inside[1]) < -error && beyond(depths.inside[0]) > error;
+    let rate = ray.shear.depth_rate;
+    // A NaN, from 0 / 0, loses to the depths of the vertices.
+    let depth = (a.depth + rise / size_of_total).max(nearest_depth).min(farthest_depth);
+    let low = (a.depth + (rise - error) / size_of_total).max(nearest_depth);
+    Some(Sieved {
+        sure,
+        inside,
+        front: (total < 0.0) == (ray.shear.depth_sign > 0.0),
+        nearest: (low - low.abs() * (8.0 * UNIT32)) / rate,
+        t: depth / rate,
+        weights: [over_b / total, over_c / total],
+    })
 }
 
-/// The volumes, if all that are not zero have one sign; each within one unit in the last place.
-fn exact_volumes(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<[f64; 3]> {
-    let volumes = exact::volumes(ray, triangle);
-    let has = |sign| volumes.iter().any(|volume| volume.sign() == sign);
-    (has(Ordering::Less) != has(Ordering::Greater)).then(|| volumes.map(|v| v.approximate()))
-}
-
-/// The `t` at which the ray meets the triangle's plane, and a bound on its error.
-fn plane(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<(f64, f64)> {
-    let [a, b, c] = triangle.map(wide);
-    let (e1, e2) = (b - a, c - a);
-    let n = e1.cross(e2);
-    let to_plane = a - ray.origin;
-    let along = ray.direction.dot(n);
-    // Four roundings in `n`, one in `to_plane`, three in either dot product.
-    let size = gamma(8) * sum_abs(e1) * sum_abs(e2);
-    let along_error = ray.direction_size * size;
-    let t = to_plane.dot(n) / along;
-    if 1024.0 * along_error < along.abs() {
-        let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
-        // A hundredth for the divisor's own error, and the rounding of the quotient.
-        return Some((t, 1.01 * t_error + 2.0 * UNIT * t.abs()));
-    }
-    Some(Distance::new(ray, &Meeting::Triangle(triangle))?.approximate())
-}
-
-/// Whether the triangle has area. Exact for all finite vertices.
-pub(crate) fn has_area(triangle: [[f32; 3]; 3]) -> bool {
-    let [a, b, c] = triangle.map(wide);
-    let (e1, e2) = (b - a, c - a);
-    let surely = |k: usize| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        let (p, q) = (e1[i] * e2[j], e1[j] * e2[i]);
-        // Three roundings a product and one for the difference.
-        (p - q).abs() > 2.0 * gamma(4) * (p.abs() + q.abs())
-    };
-    (0..3).any(surely) || exact::has_area(triangle)
-}
-
-/// The unit normal `(b - a) x (c - a)`, within a few ulp for triangles that are not slivers.
-pub(crate) fn normal(triangle: [[f32; 3]; 3]) -> DVec3 {
-    let [a, b, c] = triangle.map(wide);
-    (b - a).cross(c - a).normalize_or_zero()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ray::Ray;
-
-    const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-
-    fn meet(origin: [f32; 3], direction: [f32; 3]) -> Option<TriangleHit> {
-        intersect(&Ray::new(origin, direction).prepare().expect("a valid ray"), TRIANGLE)
-    }
-
-    #[test]
-    fn weights_belong_to_the_second_and_third_vertex() {
-        let hit = meet([0.5, 0.125, 2.0], [0.0, 0.0, -0.5]).expect("a hit");
-        assert_eq!((hit.t, hit.weights, hit.front), (4.0, [0.5, 0.125], true));
-        let behind = meet([0.5, 0.125, -2.0], [0.0, 0.0, 1.0]).expect("a hit");
-        assert_eq!((behind.t, behind.weights, behind.front), (2.0, [0.5, 0.125], false));
-    }
-
-    #[test]
-    fn the_boundary_belongs_to_the_triangle() {
-        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.25, 0.0)] {
-            assert!(meet([x, y, 1.0], [0.0, 0.0, -1.0]).is_some(), "{x} {y}");
-        }
-        assert!(meet([0.5, 0.5f32.next_up(), 1.0], [0.0, 0.0, -1.0]).is_none());
-        assert!(meet([0.25, -1e-30, 1.0], [0.0, 0.0, -1.0]).is_none());
-    }
-
-    #[test]
-    fn a_ray_in_the_plane_misses() {
-        assert!(meet([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0]).is_none());
-        assert!(meet([-1.0, 0.25, 1.0], [1.0, 0.0, 0.0]).is_none());
-    }
-
-    #[test]
-    fn area_is_decided_exactly() {
-        assert!(has_area(TRIANGLE));
-        assert!(!has_area([[0.1, 0.2, 0.3]; 3]));
-        assert!(!has_area([[0.0; 3], [1e-3, 2e-3, 3e-3], [2e-3, 4e-3, 6e-3]]));
-        // One ulp beside the line, far from the origin.
-        let far = [[1e6, 1e6, 0.0], [1e6 + 1.0, 1e6 + 1.0, 0.0], [1e6 + 2.0, 1e6 + 2.0, 0.0]];
-        assert!(!has_area(far));
-        let mut beside = far;
-        beside[2][1] = beside[2][1].next_up();
-        assert!(has_area(beside));
-        assert!(has_area([[0.0; 3], [1e-44, 0.0, 0.0], [0.0, 1e-44, 0.0]]));
-        assert!(has_area([[-3e38, 0.0, 0.0], [3e38, 0.0, 0.0], [0.0, 3e38, 0.0]]));
-    }
+/// The triangle in a lane, unless the ray surely does not meet it.
+pub(crate) fn lane(
+    ray: &PreparedRay,
+    depths: &Depths,
+    block: &TriangleBlock,
+    place: (u32, u32),
+    prim: u32,
+) -> Option<TriangleLane> {
+    let corners = block.triangle(place.1 as usize);
+    let Sieved { sure, inside, front, nearest, t, weights } = sieve(ray, depths, corners)?;
+    Some(TriangleLane { corners, prim, place, sure, inside, front, nearest, t, weights })
 }

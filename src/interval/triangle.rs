@@ -1,0 +1,168 @@
+//! Ray against triangle: filters in `f64`, and real arithmetic where they are unsure.
+
+use core::cmp::Ordering;
+
+use glam::DVec3;
+
+use crate::exact::{self, Distance, Line, Meeting};
+use crate::math::rounding::{UNIT, gamma};
+use crate::math::{sum_abs, wide};
+
+/// Where a ray's line meets a triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriangleMeeting {
+    pub t: f64,
+    pub t_error: f64,
+    pub front: bool,
+    /// Whether it took real arithmetic to know.
+    pub exact: bool,
+}
+
+/// The meeting of the line with the closed triangle, whatever its `t`.
+///
+/// Exact: hit or miss and the side are those of real arithmetic, for all finite inputs. `t` is within
+/// `t_error`. A line parallel to the plane misses.
+///
+/// The sign of `d . (p x q)` says on which side of the edge from `p` to `q`, both relative to the
+/// origin, the line passes. It is computed as `d . ((p + q) x (q - p)) / 2`, whose error grows with
+/// the edge and not with the distance: eight roundings, of products whose sums are at most
+/// `|d| (|p| + |q|) |q - p|` in the norm of absolute sums. What is not larger than that bound is
+/// computed again without error.
+///
+/// Source: \[DEG12\]; filter and exact part after \[She97\].
+pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
+    let [u, v, w] = volumes(line, triangle);
+    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+    let [a, b, c] = triangle.map(wide);
+    let [ra, rb, rc] = [a, b, c].map(|p| sum_abs(p - wide(line.origin)));
+    let side = sum_abs(b - a).max(sum_abs(c - b)).max(sum_abs(a - c));
+    let reach = ra.max(rb).max(rc);
+    let bound = gamma(10) * sum_abs(wide(line.direction)) * 2.0 * reach * side;
+    if least < -bound && most > bound {
+        return None;
+    }
+    let sure = least > bound || most < -bound;
+    if !sure && !exactly_met(line, triangle) {
+        return None;
+    }
+    let meeting = plane(line, triangle)?;
+    Some(TriangleMeeting { exact: meeting.exact || !sure, ..meeting })
+}
+
+/// Twice the volumes over the edges opposite to the second, the third and the first vertex.
+fn volumes(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 3] {
+    let [a, b, c] = triangle.map(wide);
+    let (o, d) = (wide(line.origin), wide(line.direction));
+    let (ra, rb, rc) = (a - o, b - o, c - o);
+    let edge = |p: DVec3, q: DVec3, pq: DVec3| d.dot((p + q).cross(pq));
+    [edge(rc, ra, a - c), edge(ra, rb, b - a), edge(rb, rc, c - b)]
+}
+
+/// Whether all volumes that are not zero have one sign.
+fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> bool {
+    let volumes = exact::volumes(line, triangle);
+    let has = |sign| volumes.iter().any(|volume| volume.sign() == sign);
+    has(Ordering::Less) != has(Ordering::Greater)
+}
+
+/// The weights of the second and the third vertex where the line meets the triangle, by one sequence
+/// of operations whatever decided that it does; 0 when they cannot be told.
+pub(crate) fn weights(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 2] {
+    let [u, v, w] = volumes(line, triangle);
+    let sum = u + v + w;
+    if sum == 0.0 { [0.0; 2] } else { [u / sum, v / sum] }
+}
+
+/// The meeting of the line with the triangle's plane: all that is left to ask for a line that surely
+/// passes between the edges. `None` when it is parallel.
+pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
+    let [a, b, c] = triangle.map(wide);
+    let d = wide(line.direction);
+    let (e1, e2) = (b - a, c - a);
+    let n = e1.cross(e2);
+    let to_plane = a - wide(line.origin);
+    let along = d.dot(n);
+    // Four roundings in `n`, one in `to_plane`, three in either dot product.
+    let size = gamma(8) * sum_abs(e1) * sum_abs(e2);
+    let along_error = sum_abs(d) * size;
+    let t = to_plane.dot(n) / along;
+    if 1024.0 * along_error < along.abs() {
+        let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
+        // A hundredth for the divisor's own error, and the rounding of the quotient.
+        let t_error = 1.01 * t_error + 2.0 * UNIT * t.abs();
+        return Some(TriangleMeeting { t, t_error, front: along < 0.0, exact: false });
+    }
+    let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
+    let (t, t_error) = distance.approximate();
+    Some(TriangleMeeting { t, t_error, front: exact::faces(line, triangle), exact: true })
+}
+
+/// Whether the triangle has area. Exact for all finite vertices.
+pub(crate) fn has_area(triangle: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = triangle.map(wide);
+    let (e1, e2) = (b - a, c - a);
+    let surely = |k: usize| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        let (p, q) = (e1[i] * e2[j], e1[j] * e2[i]);
+        // Three roundings a product and one for the difference.
+        (p - q).abs() > 2.0 * gamma(4) * (p.abs() + q.abs())
+    };
+    (0..3).any(surely) || exact::has_area(triangle)
+}
+
+/// The unit normal `(b - a) x (c - a)`, within a few ulp for triangles that are not slivers.
+pub(crate) fn normal(triangle: [[f32; 3]; 3]) -> DVec3 {
+    let [a, b, c] = triangle.map(wide);
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+    fn shot(origin: [f32; 3], direction: [f32; 3]) -> Option<(f64, [f64; 2], bool)> {
+        let line = Line { origin, direction };
+        let meeting = meet(&line, TRIANGLE)?;
+        Some((meeting.t, weights(&line, TRIANGLE), meeting.front))
+    }
+
+    #[test]
+    fn weights_belong_to_the_second_and_third_vertex() {
+        let hit = shot([0.5, 0.125, 2.0], [0.0, 0.0, -0.5]);
+        assert_eq!(hit, Some((4.0, [0.5, 0.125], true)));
+        let behind = shot([0.5, 0.125, -2.0], [0.0, 0.0, 1.0]);
+        assert_eq!(behind, Some((2.0, [0.5, 0.125], false)));
+    }
+
+    #[test]
+    fn the_boundary_belongs_to_the_triangle() {
+        for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.5), (0.25, 0.0)] {
+            assert!(shot([x, y, 1.0], [0.0, 0.0, -1.0]).is_some(), "{x} {y}");
+        }
+        assert!(shot([0.5, 0.5f32.next_up(), 1.0], [0.0, 0.0, -1.0]).is_none());
+        assert!(shot([0.25, -1e-30, 1.0], [0.0, 0.0, -1.0]).is_none());
+    }
+
+    #[test]
+    fn a_ray_in_the_plane_misses() {
+        assert!(shot([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0]).is_none());
+        assert!(shot([-1.0, 0.25, 1.0], [1.0, 0.0, 0.0]).is_none());
+    }
+
+    #[test]
+    fn area_is_decided_exactly() {
+        assert!(has_area(TRIANGLE));
+        assert!(!has_area([[0.1, 0.2, 0.3]; 3]));
+        assert!(!has_area([[0.0; 3], [1e-3, 2e-3, 3e-3], [2e-3, 4e-3, 6e-3]]));
+        // One ulp beside the line, far from the origin.
+        let far = [[1e6, 1e6, 0.0], [1e6 + 1.0, 1e6 + 1.0, 0.0], [1e6 + 2.0, 1e6 + 2.0, 0.0]];
+        assert!(!has_area(far));
+        let mut beside = far;
+        beside[2][1] = beside[2][1].next_up();
+        assert!(has_area(beside));
+        assert!(has_area([[0.0; 3], [1e-44, 0.0, 0.0], [0.0, 1e-44, 0.0]]));
+        assert!(has_area([[-3e38, 0.0, 0.0], [3e38, 0.0, 0.0], [0.0, 3e38, 0.0]]));
+    }
+}

@@ -1,0 +1,158 @@
+//! The questions: the closest hit, any hit, a known hit.
+
+use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
+use crate::ray::PreparedRay;
+
+/// The closest hit: least `t`, and of equal ones the first primitive.
+pub(crate) struct Closest<'m, D: Decide, W> {
+    filter: Filter<'m>,
+    t_bound: f32,
+    pub best: Option<D::Met>,
+    memory: D::Memory,
+    watch: W,
+}
+
+impl<'m, D: Decide, W: Watch> Closest<'m, D, W> {
+    pub fn new(filter: Filter<'m>, ray: &PreparedRay, watch: W) -> Self {
+        Closest { filter, t_bound: ray.t_max, best: None, memory: D::Memory::default(), watch }
+    }
+
+    fn consider(&mut self, ray: &PreparedRay, met: &D::Met) {
+        if !self.filter.faces(met.front()) {
+            return;
+        }
+        if let Some(best) = &self.best {
+            // The grid offers a primitive once for each cell that holds it.
+            let known = met.prim() == best.prim() && met.root() == best.root();
+            if known || !D::is_before(ray, met, best, &mut self.memory, &mut self.watch) {
+                return;
+            }
+        }
+        self.best = Some(*met);
+        self.t_bound = self.t_bound.min(D::t_bound(ray, met));
+    }
+}
+
+impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
+    type Watch = W;
+
+    fn t_bound(&self) -> f32 {
+        self.t_bound
+    }
+
+    fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        // What was offered once is not computed again.
+        let known = self.best.as_ref().is_some_and(|best| best.prim() == lane.prim);
+        if !known
+            && lane.nearest <= self.t_bound
+            && self.filter.sees(lane.prim, true)
+            && let Some(met) = D::triangle(ray, lane, &mut self.watch)
+        {
+            self.consider(ray, &met);
+        }
+        false
+    }
+
+    fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
+        if self.filter.sees(lane.prim, false) {
+            for met in D::sphere(ray, lane, &mut self.watch).iter().flatten() {
+                if self.filter.sees(lane.prim, met.skippable()) {
+                    self.consider(ray, met);
+                }
+            }
+        }
+        false
+    }
+
+    fn watch(&mut self) -> &mut W {
+        &mut self.watch
+    }
+}
+
+/// Whether anything is hit.
+pub(crate) struct Any<'m, D, W> {
+    filter: Filter<'m>,
+    t_max: f32,
+    watch: W,
+    decide: core::marker::PhantomData<D>,
+}
+
+impl<'m, D: Decide, W: Watch> Any<'m, D, W> {
+    pub fn new(filter: Filter<'m>, ray: &PreparedRay, watch: W) -> Self {
+        Any { filter, t_max: ray.t_max, watch, decide: core::marker::PhantomData }
+    }
+}
+
+impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
+    type Watch = W;
+
+    fn t_bound(&self) -> f32 {
+        self.t_max
+    }
+
+    fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        if !self.filter.sees(lane.prim, true) {
+            return false;
+        }
+        // No `t` is needed of what is surely hit.
+        if lane.inside {
+            return self.filter.faces(lane.front);
+        }
+        D::triangle(ray, lane, &mut self.watch).is_some_and(|met| self.filter.faces(met.front()))
+    }
+
+    fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
+        self.filter.sees(lane.prim, false)
+            && D::sphere(ray, lane, &mut self.watch).iter().flatten().any(|met| {
+                self.filter.sees(lane.prim, met.skippable()) && self.filter.faces(met.front())
+            })
+    }
+
+    fn watch(&mut self) -> &mut W {
+        &mut self.watch
+    }
+}
+
+/// Finds the hit with this primitive and this answered `t` again.
+pub(crate) struct Locate<D: Decide> {
+    prim: u32,
+    t: f32,
+    t_max: f32,
+    pub found: Option<D::Met>,
+    watch: (),
+}
+
+impl<D: Decide> Locate<D> {
+    pub fn new(prim: u32, t: f32, ray: &PreparedRay) -> Self {
+        Locate { prim, t, t_max: ray.t_max, found: None, watch: () }
+    }
+
+    fn consider(&mut self, ray: &PreparedRay, met: Option<D::Met>) -> bool {
+        self.found = met.filter(|met| D::t(ray, met, &mut ()) == self.t);
+        self.found.is_some()
+    }
+}
+
+impl<D: Decide> Query for Locate<D> {
+    type Watch = ();
+
+    fn t_bound(&self) -> f32 {
+        self.t_max
+    }
+
+    fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        lane.prim == self.prim && {
+            let met = D::triangle(ray, lane, &mut ());
+            self.consider(ray, met)
+        }
+    }
+
+    fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
+        lane.prim == self.prim
+            && D::sphere(ray, lane, &mut ()).into_iter().any(|met| self.consider(ray, met))
+    }
+
+    fn watch(&mut self) -> &mut () {
+        &mut self.watch
+    }
+}

@@ -1,0 +1,217 @@
+//! Decisions as in real arithmetic: intervals in `f64` first, then numbers without error.
+
+use core::cmp::Ordering;
+
+use super::{Decide, Meets, SphereLane, TriangleLane, Watch, Within, clamped_weights, within};
+use crate::exact::{Distance, Line, Meeting};
+use crate::interval::{sphere, triangle};
+use crate::ray::{Interval, PreparedRay};
+
+/// Hit or miss, the primitive and the order of real arithmetic; `t` correctly rounded.
+pub(crate) struct Exact;
+
+/// A meeting, and an interval that holds its real `t`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ExactMet {
+    t: f64,
+    /// A bound on the error of `t`.
+    t_error: f64,
+    /// What is met, from which the real `t` follows.
+    meeting: Meeting,
+    prim: u32,
+    place: (u32, u32),
+    front: bool,
+    skippable: bool,
+}
+
+impl Meets for ExactMet {
+    fn prim(&self) -> u32 {
+        self.prim
+    }
+
+    fn place(&self) -> (u32, u32) {
+        self.place
+    }
+
+    fn front(&self) -> bool {
+        self.front
+    }
+
+    fn root(&self) -> usize {
+        match self.meeting {
+            Meeting::Triangle(_) => 0,
+            Meeting::Sphere { root, .. } => root,
+        }
+    }
+
+    fn skippable(&self) -> bool {
+        self.skippable
+    }
+}
+
+impl ExactMet {
+    /// Floats between which the real `t` lies.
+    ///
+    /// `t_error` grants at least one rounding of `t` more than the error needs, which covers the
+    /// rounding of these two sums; a hundredth of it covers its own arithmetic.
+    fn interval(&self) -> Interval<f64> {
+        let margin = 1.01 * self.t_error;
+        Interval { near: self.t - margin, far: self.t + margin }
+    }
+
+    /// The meeting, if its real `t` is within the ray's limits.
+    fn limited(self, ray: &PreparedRay, watch: &mut impl Watch) -> Option<Self> {
+        let (t_min, t_max) = (ray.given.t_min, ray.given.t_max);
+        let inside = match within(self.interval(), f64::from(t_min), f64::from(t_max)) {
+            Within::None => false,
+            Within::All => true,
+            Within::Part => {
+                watch.exact();
+                Distance::new(&line(ray), &self.meeting).is_some_and(|t| {
+                    t.compare_with(t_min) != Ordering::Less
+                        && t.compare_with(t_max) != Ordering::Greater
+                })
+            }
+        };
+        inside.then_some(self)
+    }
+}
+
+fn line(ray: &PreparedRay) -> Line {
+    Line { origin: ray.given.origin, direction: ray.given.direction }
+}
+
+/// The real `t` of the best meeting, once a comparison has needed it.
+#[derive(Default)]
+pub(crate) struct ExactMemory {
+    /// Whose it is.
+    of: Option<(u32, usize)>,
+    t: Option<Distance>,
+}
+
+impl ExactMemory {
+    fn t_of(&mut self, ray: &PreparedRay, met: &ExactMet) -> Option<&Distance> {
+        let key = (met.prim, met.root());
+        if self.of != Some(key) {
+            *self = ExactMemory { of: Some(key), t: Distance::new(&line(ray), &met.meeting) };
+        }
+        self.t.as_ref()
+    }
+}
+
+impl Decide for Exact {
+    type Met = ExactMet;
+    type Memory = ExactMemory;
+
+    fn triangle(
+        ray: &PreparedRay,
+        lane: &TriangleLane,
+        watch: &mut impl Watch,
+    ) -> Option<ExactMet> {
+        watch.interval();
+        let line = line(ray);
+        let meeting = if lane.sure {
+            triangle::plane(&line, lane.corners)
+        } else {
+            triangle::meet(&line, lane.corners)
+        }?;
+        if meeting.exact {
+            watch.exact();
+        }
+        let met = ExactMet {
+            t: meeting.t,
+            t_error: meeting.t_error,
+            meeting: Meeting::Triangle(lane.corners),
+            prim: lane.prim,
+            place: lane.place,
+            front: meeting.front,
+            skippable: true,
+        };
+        met.limited(ray, watch)
+    }
+
+    fn sphere(
+        ray: &PreparedRay,
+        lane: &SphereLane,
+        watch: &mut impl Watch,
+    ) -> [Option<ExactMet>; 2] {
+        watch.interval();
+        let SphereLane { centre, radius, .. } = *lane;
+        let Some(both) = sphere::meet(&line(ray), centre, radius) else { return [None; 2] };
+        if both.exact {
+            watch.exact();
+        }
+        [0, 1].map(|root| {
+            let met = ExactMet {
+                t: both.t[root],
+                t_error: both.t_error[root],
+                meeting: Meeting::Sphere { centre, radius, root },
+                prim: lane.prim,
+                place: lane.place,
+                front: root == 0,
+                // A line that only touches meets front and back in one point.
+                skippable: both.touches || root == both.nearest,
+            };
+            met.limited(ray, watch)
+        })
+    }
+
+    fn is_before(
+        ray: &PreparedRay,
+        met: &ExactMet,
+        best: &ExactMet,
+        memory: &mut ExactMemory,
+        watch: &mut impl Watch,
+    ) -> bool {
+        let (a, b) = (met.interval(), best.interval());
+        if a.far < b.near {
+            return true;
+        }
+        if b.far < a.near {
+            return false;
+        }
+        let first = met.prim < best.prim;
+        if met.meeting.surely_equal(&best.meeting) {
+            return first;
+        }
+        watch.exact();
+        let mine = Distance::new(&line(ray), &met.meeting);
+        match mine.zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best)) {
+            Some(Ordering::Less) => true,
+            Some(Ordering::Greater) => false,
+            Some(Ordering::Equal) => first,
+            // Neither number exists: only blocks of foreign bytes come here.
+            None => met.t < best.t,
+        }
+    }
+
+    fn t_bound(ray: &PreparedRay, met: &ExactMet) -> f32 {
+        ray.t_above(met.interval().far)
+    }
+
+    fn t(ray: &PreparedRay, met: &ExactMet, watch: &mut impl Watch) -> f32 {
+        let nearest = met.t as f32;
+        let Interval { near, far } = met.interval();
+        let rounded = if near as f32 == nearest && far as f32 == nearest {
+            nearest
+        } else {
+            watch.rounding();
+            Distance::new(&line(ray), &met.meeting).map_or(nearest, |t| t.round())
+        };
+        // Adding +0 turns -0 into +0.
+        rounded + 0.0
+    }
+
+    fn fine_t(_: &PreparedRay, met: &ExactMet) -> f64 {
+        met.t
+    }
+
+    fn weights(ray: &PreparedRay, met: &ExactMet) -> [f32; 2] {
+        match met.meeting {
+            Meeting::Triangle(corners) => {
+                clamped_weights(triangle::weights(&line(ray), corners).map(|x| x as f32))
+            }
+            Meeting::Sphere { .. } => [0.0; 2],
+        }
+    }
+}

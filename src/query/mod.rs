@@ -1,0 +1,210 @@
+//! What a ray may ask: its options, and the traversal's side of the question.
+//!
+//! A traversal offers lanes of leaf blocks that the filter of [`prim`](crate::prim) could not reject. How
+//! a lane is decided is a [`Decide`]: [`Exact`] or [`Watertight`]. What is made of those that are met
+//! is a [`Query`]: [`Closest`], [`Any`] or [`Locate`]. Each question goes with each precision.
+
+mod ask;
+mod exact;
+mod options;
+mod watertight;
+
+pub(crate) use ask::{Any, Closest, Locate};
+pub(crate) use exact::Exact;
+pub use options::{Facing, Precision, PrimId, QueryOptions};
+pub(crate) use options::{Filter, flat_number, geometry_of};
+pub(crate) use watertight::Watertight;
+
+use crate::ray::{Interval, PreparedRay};
+
+/// What a query did, for charts and heat maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Boxes of BVH nodes, or cells of a grid, looked at.
+    pub steps: u64,
+    /// Leaf blocks opened.
+    pub blocks: u64,
+    /// Triangles and spheres tested.
+    pub tests: u64,
+    /// Meetings whose `t` was computed in `f64`.
+    pub intervals: u64,
+    /// Decisions that took real arithmetic.
+    pub exact: u64,
+    /// Final `t` whose rounding took real arithmetic.
+    pub roundings: u64,
+}
+
+/// Looks on while a query is answered: nobody, or [`Counts`].
+pub(crate) trait Watch {
+    /// A box or a cell was looked at.
+    fn step(&mut self) {}
+    /// A leaf block was opened, to test this many lanes.
+    fn block(&mut self, _tests: u32) {}
+    /// The `t` of a meeting was computed in `f64`.
+    fn interval(&mut self) {}
+    /// A decision took real arithmetic.
+    fn exact(&mut self) {}
+    /// The rounding of the answer took real arithmetic.
+    fn rounding(&mut self) {}
+}
+
+impl Watch for () {}
+
+impl Watch for &mut Counts {
+    fn step(&mut self) {
+        self.steps += 1;
+    }
+
+    fn block(&mut self, tests: u32) {
+        self.blocks += 1;
+        self.tests += u64::from(tests);
+    }
+
+    fn interval(&mut self) {
+        self.intervals += 1;
+    }
+
+    fn exact(&mut self) {
+        self.exact += 1;
+    }
+
+    fn rounding(&mut self) {
+        self.roundings += 1;
+    }
+}
+
+/// A triangle that the filter could not reject. Depths and `t` are those of the frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriangleLane {
+    pub corners: [[f32; 3]; 3],
+    /// The flat number of the primitive.
+    pub prim: u32,
+    /// Where it is stored: the number of its leaf block and its lane.
+    pub place: (u32, u32),
+    /// The ray's line passes between the edges: this is no longer in doubt.
+    pub sure: bool,
+    /// And the real `t` is within the ray's limits.
+    pub inside: bool,
+    /// Whether the line meets the front; right when `sure`.
+    pub front: bool,
+    /// Not above the real `t`, if the triangle is met.
+    pub nearest: f32,
+    /// The `t` computed in `f32`, between those of the nearest and the farthest vertex.
+    pub t: f32,
+    /// Weights of the second and the third vertex, computed in `f32`.
+    pub weights: [f32; 2],
+}
+
+/// A sphere that the filter could not reject.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SphereLane {
+    pub centre: [f32; 3],
+    pub radius: f32,
+    pub prim: u32,
+    pub place: (u32, u32),
+    /// The two `t` in the frame computed in `f32`, in order.
+    pub t: [f32; 2],
+    /// A bound on the error of both.
+    pub t_error: f32,
+    /// Whether the second of them is nearer to zero.
+    pub far_is_nearest: bool,
+}
+
+/// The question a traversal answers: it offers lanes and obeys the bound. The same lane may come
+/// twice.
+pub(crate) trait Query {
+    type Watch: Watch;
+
+    /// Nothing beyond this `t` of the frame is of interest any more.
+    fn t_bound(&self) -> f32;
+
+    /// Considers a triangle; true ends the traversal.
+    fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool;
+
+    /// Considers a sphere; true ends the traversal.
+    fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool;
+
+    fn watch(&mut self) -> &mut Self::Watch;
+}
+
+/// How lanes are decided and meetings are ordered.
+pub(crate) trait Decide {
+    /// A meeting of the ray with a primitive, within the ray's limits as far as this can tell.
+    type Met: Copy + Meets;
+
+    /// The meeting with a triangle of which the filter is not sure.
+    fn triangle(
+        ray: &PreparedRay,
+        lane: &TriangleLane,
+        watch: &mut impl Watch,
+    ) -> Option<Self::Met>;
+
+    /// The meetings with a sphere that lie within the limits, entering and leaving.
+    fn sphere(
+        ray: &PreparedRay,
+        lane: &SphereLane,
+        watch: &mut impl Watch,
+    ) -> [Option<Self::Met>; 2];
+
+    /// What is remembered of the best meeting while others are compared with it.
+    type Memory: Default;
+
+    /// Whether `met` comes before `best`: at a smaller `t`, or at an equal one with a smaller number.
+    fn is_before(
+        ray: &PreparedRay,
+        met: &Self::Met,
+        best: &Self::Met,
+        memory: &mut Self::Memory,
+        watch: &mut impl Watch,
+    ) -> bool;
+
+    /// A `t` of the frame that is not below the real one of `met`, or whatever stands for it.
+    fn t_bound(ray: &PreparedRay, met: &Self::Met) -> f32;
+
+    /// The given `t` of the answer.
+    fn t(ray: &PreparedRay, met: &Self::Met, watch: &mut impl Watch) -> f32;
+
+    /// The given `t` in `f64`, as well as it is known.
+    fn fine_t(ray: &PreparedRay, met: &Self::Met) -> f64;
+
+    /// The weights of the second and the third vertex.
+    fn weights(ray: &PreparedRay, met: &Self::Met) -> [f32; 2];
+}
+
+/// What every meeting knows of itself.
+pub(crate) trait Meets {
+    fn prim(&self) -> u32;
+    fn place(&self) -> (u32, u32);
+    fn front(&self) -> bool;
+    /// Which of the meetings with one primitive it is.
+    fn root(&self) -> usize;
+    /// Whether skipping the primitive skips this: false for the root of a sphere that is not the
+    /// nearest to `t = 0`.
+    fn skippable(&self) -> bool;
+}
+
+/// The part of `[0, 1]` in which weights lie: neither they nor `1 - u - v` are negative; `v` gives way.
+#[expect(clippy::manual_clamp, reason = "`clamp` panics on the NaN that foreign blocks can give")]
+fn clamped_weights([u, v]: [f32; 2]) -> [f32; 2] {
+    let u = u.max(0.0).min(1.0) + 0.0;
+    let v = v.max(0.0).min(1.0 - u) + 0.0;
+    [u, v]
+}
+
+/// Whether all of an interval lies within the limits, or only a part of it, or none.
+fn within(part: Interval<f64>, t_min: f64, t_max: f64) -> Within {
+    if part.far < t_min || part.near > t_max {
+        Within::None
+    } else if part.near >= t_min && part.far <= t_max {
+        Within::All
+    } else {
+        Within::Part
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Within {
+    None,
+    Part,
+    All,
+}

@@ -1,0 +1,107 @@
+//! What one query may leave out, and how right it must be.
+
+use crate::block::Geometry;
+use crate::ray::NONE;
+
+/// Which of two sides of a surface a ray may meet.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Facing {
+    /// Both sides.
+    #[default]
+    Both,
+    /// Only the front: the side from which a triangle's vertices run counter-clockwise, and the
+    /// outside of a sphere.
+    Front,
+    /// Only the back.
+    Back,
+}
+
+/// How right an answer must be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// Hit or miss, which primitive and which order as in real arithmetic; `t` is the nearest float;
+    /// the same bits from every structure and on every machine.
+    #[default]
+    Exact,
+    /// In `f32`, for the last per cent of speed and for processors without `f64`: nothing that the ray
+    /// hits is missed, and `t` is within a stated bound.
+    Watertight,
+}
+
+/// A primitive by its numbers, as they stand in a [`Hit`](crate::Hit).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PrimId {
+    /// The number within the geometry.
+    pub prim: u32,
+    /// The mesh, or the number of meshes plus the sphere set.
+    pub geometry: u32,
+    /// The instance, [`NONE`](crate::NONE) outside instances.
+    pub instance: u32,
+}
+
+/// What one query may leave out. The default leaves out nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct QueryOptions {
+    /// How right the answer must be.
+    pub precision: Precision,
+    /// A geometry is seen when its mask and this one share a bit, or when either is zero.
+    pub mask: u32,
+    /// The sides of surfaces that count.
+    pub facing: Facing,
+    /// A primitive to leave out, such as the one the ray starts on. Of a sphere only the root
+    /// nearest to `t = 0` is left out, so that a ray refracted into it still leaves it.
+    pub skip: Option<PrimId>,
+}
+
+/// What a query leaves out, in flat numbers.
+#[derive(Clone, Copy)]
+pub(crate) struct Filter<'m> {
+    geometries: &'m [Geometry],
+    mask: u32,
+    facing: Facing,
+    skip: u32,
+}
+
+impl<'m> Filter<'m> {
+    /// The filter of `options` over a scene with these geometries.
+    pub fn new(options: &QueryOptions, geometries: &'m [Geometry], prim_limit: u32) -> Self {
+        let skip = options.skip.and_then(|id| flat_number(&id, geometries, prim_limit));
+        let QueryOptions { mask, facing, .. } = *options;
+        Filter { geometries, mask, facing, skip: skip.unwrap_or(NONE) }
+    }
+
+    /// Whether a meeting with this primitive counts; only those that are `skippable` are skipped.
+    pub fn sees(&self, prim: u32, skippable: bool) -> bool {
+        !(skippable && prim == self.skip) && (self.mask == 0 || self.mask_sees(prim))
+    }
+
+    /// Whether a meeting with this side counts.
+    pub fn faces(&self, front: bool) -> bool {
+        match self.facing {
+            Facing::Both => true,
+            Facing::Front => front,
+            Facing::Back => !front,
+        }
+    }
+
+    fn mask_sees(&self, prim: u32) -> bool {
+        let mask = geometry_of(prim, self.geometries).map_or(0, |(_, g)| g.mask);
+        mask == 0 || mask & self.mask != 0
+    }
+}
+
+/// The number of the geometry that holds the flat number `prim`, and the geometry.
+pub(crate) fn geometry_of(prim: u32, geometries: &[Geometry]) -> Option<(u32, &Geometry)> {
+    // Empty geometries share their first number with the next one; the last of them holds it.
+    let after = geometries.partition_point(|g| g.first <= prim);
+    let number = after.checked_sub(1)?;
+    Some((number as u32, geometries.get(number)?))
+}
+
+/// The flat number of a primitive outside instances, or `None` when it does not exist.
+pub(crate) fn flat_number(id: &PrimId, geometries: &[Geometry], prim_limit: u32) -> Option<u32> {
+    let g = id.geometry as usize;
+    let end = geometries.get(g.checked_add(1)?).map_or(prim_limit, |next| next.first);
+    let prim = geometries.get(g)?.first.checked_add(id.prim)?;
+    (id.instance == NONE && prim < end).then_some(prim)
+}

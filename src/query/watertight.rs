@@ -1,0 +1,125 @@
+//! Decisions in `f32` alone.
+
+use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
+use crate::ray::PreparedRay;
+
+/// Nothing that the ray hits is missed: what the filter could not reject is met. Of two meetings
+/// the one with the smaller computed `t` comes first.
+pub(crate) struct Watertight;
+
+/// A meeting with its `t` in the frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WatertightMet {
+    t: f32,
+    weights: [f32; 2],
+    prim: u32,
+    place: (u32, u32),
+    front: bool,
+    root: usize,
+    skippable: bool,
+}
+
+impl Meets for WatertightMet {
+    fn prim(&self) -> u32 {
+        self.prim
+    }
+
+    fn place(&self) -> (u32, u32) {
+        self.place
+    }
+
+    fn front(&self) -> bool {
+        self.front
+    }
+
+    fn root(&self) -> usize {
+        self.root
+    }
+
+    fn skippable(&self) -> bool {
+        self.skippable
+    }
+}
+
+impl Decide for Watertight {
+    type Met = WatertightMet;
+    type Memory = ();
+
+    fn triangle(
+        ray: &PreparedRay,
+        lane: &TriangleLane,
+        _: &mut impl Watch,
+    ) -> Option<WatertightMet> {
+        Some(WatertightMet {
+            t: limited(ray, lane.t),
+            weights: lane.weights,
+            prim: lane.prim,
+            place: lane.place,
+            front: lane.front,
+            root: 0,
+            skippable: true,
+        })
+    }
+
+    fn sphere(
+        ray: &PreparedRay,
+        lane: &SphereLane,
+        _: &mut impl Watch,
+    ) -> [Option<WatertightMet>; 2] {
+        let nearest = usize::from(lane.far_is_nearest);
+        [0, 1].map(|root| {
+            let (t, slack) = (lane.t[root], lane.t_error);
+            // Written so that a NaN stays.
+            if t + slack < ray.t_min || t - slack > ray.t_max {
+                return None;
+            }
+            Some(WatertightMet {
+                t: limited(ray, t),
+                weights: [0.0; 2],
+                prim: lane.prim,
+                place: lane.place,
+                front: root == 0,
+                root,
+                skippable: root == nearest || lane.t[0] == lane.t[1],
+            })
+        })
+    }
+
+    fn is_before(
+        _: &PreparedRay,
+        met: &WatertightMet,
+        best: &WatertightMet,
+        (): &mut (),
+        _: &mut impl Watch,
+    ) -> bool {
+        met.t < best.t || (met.t == best.t && met.prim < best.prim)
+    }
+
+    fn t_bound(_: &PreparedRay, met: &WatertightMet) -> f32 {
+        met.t
+    }
+
+    fn t(ray: &PreparedRay, met: &WatertightMet, _: &mut impl Watch) -> f32 {
+        // Out of the frame; what rounding at the limits moved goes back between them.
+        let t = (f64::from(met.t) / ray.t_scale) as f32;
+        limit(t, ray.given.t_min, ray.given.t_max) + 0.0
+    }
+
+    fn fine_t(ray: &PreparedRay, met: &WatertightMet) -> f64 {
+        f64::from(met.t) / ray.t_scale
+    }
+
+    fn weights(_: &PreparedRay, met: &WatertightMet) -> [f32; 2] {
+        clamped_weights(met.weights)
+    }
+}
+
+fn limited(ray: &PreparedRay, t: f32) -> f32 {
+    limit(t, ray.t_min, ray.t_max)
+}
+
+/// `t` between the limits; NaN becomes the lower one.
+#[expect(clippy::manual_clamp, reason = "`clamp` keeps a NaN, which would lose every comparison")]
+fn limit(t: f32, t_min: f32, t_max: f32) -> f32 {
+    t.max(t_min).min(t_max)
+}

@@ -1,0 +1,90 @@
+//! Rays, hits, and what a traversal knows about a ray before it starts.
+
+mod frame;
+mod slab;
+
+pub(crate) use frame::PreparedRay;
+pub(crate) use slab::{NarrowSlab, Slab, WideSlab};
+
+/// The number that stands for "no primitive", "no geometry" and "not in an instance".
+pub const NONE: u32 = u32::MAX;
+
+/// The set of points `origin + t * direction` with `t_min <= t <= t_max`, both ends included.
+///
+/// `direction` need not have length one; `t` counts in its lengths. The limits may be infinite and
+/// `t_min` may be negative. A ray with a NaN or an infinity in `origin` or `direction`, with a zero
+/// direction, with a NaN limit or with `t_min > t_max` hits nothing.
+///
+/// ```text
+/// byte 0        12      16           28      32
+///      | origin | t_min | direction | t_max |
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Ray {
+    /// Where `t` is zero.
+    pub origin: [f32; 3],
+    /// The smallest `t` that counts.
+    pub t_min: f32,
+    /// The step for `t = 1`, of any length but zero.
+    pub direction: [f32; 3],
+    /// The largest `t` that counts.
+    pub t_max: f32,
+}
+const _: () = assert!(size_of::<Ray>() == 32);
+
+impl Ray {
+    /// The ray from `origin` along `direction` with `t` from 0 to infinity.
+    pub const fn new(origin: [f32; 3], direction: [f32; 3]) -> Self {
+        Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
+    }
+
+    /// The same ray, limited to `t_min <= t <= t_max`.
+    pub const fn with_limits(self, t_min: f32, t_max: f32) -> Self {
+        Ray { t_min, t_max, ..self }
+    }
+}
+
+/// Where a ray meets a scene.
+///
+/// ```text
+/// byte 0   4   8   12     16         20         24
+///      | t | u | v | prim | geometry | instance |
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Hit {
+    /// The parameter of the hit, in lengths of the ray's direction.
+    pub t: f32,
+    /// The weight of the triangle's second vertex; 0 on spheres.
+    pub u: f32,
+    /// The weight of the triangle's third vertex; 0 on spheres.
+    pub v: f32,
+    /// The number of the triangle or sphere within its geometry.
+    pub prim: u32,
+    /// The number of the mesh, or the number of meshes plus the number of the sphere set.
+    pub geometry: u32,
+    /// The number of the instance, [`NONE`] outside instances.
+    pub instance: u32,
+}
+const _: () = assert!(size_of::<Hit>() == 24);
+
+impl Hit {
+    /// What the C entry points write for a ray that hits nothing.
+    pub const MISS: Hit =
+        Hit { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NONE, geometry: NONE, instance: NONE };
+}
+
+/// The part `near ..= far` of a ray, or of what is known of a `t`; empty when `near > far`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Interval<T> {
+    pub near: T,
+    pub far: T,
+}
+
+impl<T: PartialOrd> Interval<T> {
+    pub fn is_empty(&self) -> bool {
+        // Written so that a NaN counts as not empty: what is unclear is looked at.
+        self.near > self.far
+    }
+}
