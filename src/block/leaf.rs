@@ -19,14 +19,15 @@ pub(crate) const SPHERES: usize = 15;
 ///      | x[16] | y[16] | z[16] | corners | first | count | aabb | reserved |
 /// ```
 ///
-/// `corners[k]` holds the number of vertex `k` of triangle `i` in its nibble `i`, the lower nibble of
-/// a byte first. Triangle `i < count` is primitive `prim_ids[first + i]`. `aabb` holds them all.
+/// `corners[k]` holds the number of vertex `k` of each triangle in a nibble, the lower one of a byte
+/// first: those of even triangles in the first four bytes, those of odd ones in the others. So eight
+/// bytes repeated, each half shifted by a nibble for every second lane, are the numbers of all 16.
+/// Triangle `i < count` is primitive `prim_ids[first + i]`. `aabb` holds them all.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct TriangleBlock {
-    pub x: [f32; TRIANGLES],
-    pub y: [f32; TRIANGLES],
-    pub z: [f32; TRIANGLES],
+    /// x, y and z of the vertices.
+    pub vertices: [[f32; TRIANGLES]; 3],
     pub corners: [[u8; TRIANGLES / 2]; 3],
     pub first: u32,
     pub count: u32,
@@ -40,9 +41,7 @@ unsafe impl Plain for TriangleBlock {}
 
 impl TriangleBlock {
     pub const EMPTY: Self = TriangleBlock {
-        x: [0.0; TRIANGLES],
-        y: [0.0; TRIANGLES],
-        z: [0.0; TRIANGLES],
+        vertices: [[0.0; TRIANGLES]; 3],
         corners: [[0; TRIANGLES / 2]; 3],
         first: 0,
         count: 0,
@@ -55,8 +54,9 @@ impl TriangleBlock {
         let i = i % TRIANGLES;
         self.corners.map(|list| {
             // A nibble is below 16, so no index here can be out of range.
-            let v = usize::from(list[i / 2] >> (4 * (i % 2)) & 15);
-            [self.x[v], self.y[v], self.z[v]]
+            let (byte, shift) = nibble(i);
+            let v = usize::from(list[byte] >> shift & 15);
+            self.vertices.map(|axis| axis[v])
         })
     }
 
@@ -67,10 +67,16 @@ impl TriangleBlock {
 
     /// Writes vertex number `v` for corner `k` of triangle `i`.
     pub fn set_corner(&mut self, i: usize, k: usize, v: usize) {
-        let byte = &mut self.corners[k][i / 2];
-        let shift = 4 * (i % 2);
+        let (byte, shift) = nibble(i);
+        let byte = &mut self.corners[k][byte];
         *byte = (*byte & !(15 << shift)) | ((v as u8 & 15) << shift);
     }
+}
+
+/// The byte of triangle `i < 16` in a list of corners, and the bits below its nibble.
+fn nibble(i: usize) -> (usize, usize) {
+    let place = i % 2 * 8 + i / 2;
+    (place / 2, 4 * (place % 2))
 }
 
 /// Up to 15 spheres.
@@ -183,7 +189,7 @@ mod tests {
     fn corners_are_nibbles() {
         let mut block = TriangleBlock::EMPTY;
         for v in 0..16 {
-            block.x[v] = v as f32;
+            block.vertices[0][v] = v as f32;
         }
         for i in 0..16 {
             for k in 0..3 {

@@ -9,6 +9,7 @@
 //! block can be copied, written to a file or placed in ROM. The order lets a build finish a part
 //! before it must know the size of the next.
 
+pub(crate) mod bundle;
 pub(crate) mod cells;
 pub(crate) mod leaf;
 mod node;

@@ -86,7 +86,9 @@ impl<'b> Packer<'b> {
         for (k, corner) in corners.iter().enumerate() {
             let v = find(block, fill.vertices, corner).unwrap_or_else(|| {
                 let v = fill.vertices;
-                [block.x[v], block.y[v], block.z[v]] = *corner;
+                for (axis, x) in block.vertices.iter_mut().zip(corner) {
+                    axis[v] = *x;
+                }
                 fill.vertices += 1;
                 v
             });
@@ -118,10 +120,8 @@ impl<'b> Packer<'b> {
 
 /// The vertex with just these bits among the first `count`.
 fn find(block: &TriangleBlock, count: usize, corner: &[f32; 3]) -> Option<usize> {
-    let [x, y, z] = corner.map(f32::to_bits);
-    (0..count).find(|&v| {
-        block.x[v].to_bits() == x && block.y[v].to_bits() == y && block.z[v].to_bits() == z
-    })
+    let has = |v: usize, k: usize| block.vertices[k][v].to_bits() == corner[k].to_bits();
+    (0..count).find(|&v| (0..3).all(|k| has(v, k)))
 }
 
 /// How many vertices of the triangle the block does not have yet, at most.
