@@ -10,6 +10,7 @@ use crate::query::{
     QueryOptions, Watch, Watertight, flat_number, geometry_of,
 };
 use crate::ray::{Hit, NONE, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
+use crate::simd::{self, Kernel, Simd};
 #[cfg(feature = "capi")]
 use crate::storage;
 use crate::surface::{self, Surface};
@@ -260,24 +261,10 @@ impl<'m> Accel<'m> {
         Some(surface::of_sphere(ray, D::fine_t(ray, &found), centre, radius))
     }
 
-    /// Runs the one traversal of the structure at hand, with boxes in `f32` where the frame allows.
+    /// Runs the one traversal of the structure at hand with the best instructions there are.
+    #[inline]
     fn ask<Q: Query>(&self, ray: &PreparedRay, query: &mut Q) -> bool {
-        if let (KIND_GRID, Some(head)) = (self.0.header.kind, self.0.grids.first()) {
-            let Block { words, runs, .. } = self.0;
-            return grid::walk(&Cells { head, words, runs, leaves: self.leaves() }, ray, query);
-        }
-        match NarrowSlab::new(ray) {
-            Some(slab) => self.ask_boxes(ray, &slab, query),
-            None => self.ask_boxes(ray, &WideSlab::new(ray), query),
-        }
-    }
-
-    fn ask_boxes<Q: Query>(&self, ray: &PreparedRay, slab: &impl Slab, query: &mut Q) -> bool {
-        let leaves = self.leaves();
-        match self.0.header.kind {
-            KIND_BVH => bvh::traverse(self.0.nodes, &leaves, ray, slab, query),
-            _ => leaves.intersect_all(ray, slab, query),
-        }
+        simd::dispatch(Ask { accel: self, ray, query })
     }
 
     fn leaves(&self) -> Leaves<'m> {
@@ -296,5 +283,46 @@ impl<'m> Accel<'m> {
         let [u, v] = D::weights(ray, best);
         let t = D::t(ray, best, watch);
         Hit { t, u, v, prim: best.prim() - first, geometry, instance: NONE }
+    }
+}
+
+/// One ray's question, waiting for a backend.
+struct Ask<'a, 'm, Q> {
+    accel: &'a Accel<'m>,
+    ray: &'a PreparedRay,
+    query: &'a mut Q,
+}
+
+impl<Q: Query> Kernel for Ask<'_, '_, Q> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> bool {
+        let Ask { accel: Accel(block), ray, query } = self;
+        let leaves = self.accel.leaves();
+        if let (KIND_GRID, Some(head)) = (block.header.kind, block.grids.first()) {
+            let Block { words, runs, .. } = *block;
+            return grid::walk(s, &Cells { head, words, runs, leaves }, ray, query);
+        }
+        // Boxes in `f32` where the frame allows.
+        match NarrowSlab::new(ray) {
+            Some(slab) => boxes(s, block, &leaves, ray, &slab, query),
+            None => boxes(s, block, &leaves, ray, &WideSlab::new(ray), query),
+        }
+    }
+}
+
+#[inline(always)]
+fn boxes<S: Simd, Q: Query>(
+    s: S,
+    block: &Block,
+    leaves: &Leaves,
+    ray: &PreparedRay,
+    slab: &impl Slab,
+    query: &mut Q,
+) -> bool {
+    match block.header.kind {
+        KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
+        _ => leaves.intersect_all(s, ray, slab, query),
     }
 }

@@ -69,6 +69,8 @@ mod prim;
 mod query;
 mod ray;
 mod scene;
+mod sieve;
+mod simd;
 mod storage;
 mod surface;
 
@@ -82,4 +84,5 @@ pub use owned::OwnedAccel;
 pub use query::{Counts, Facing, Precision, PrimId, QueryOptions};
 pub use ray::{Hit, NONE, Ray};
 pub use scene::{Mesh, Scene, SphereSet, Strided};
+pub use simd::Backend;
 pub use surface::Surface;

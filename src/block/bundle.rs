@@ -82,6 +82,13 @@ impl ChildRef {
         self.0 as usize
     }
 
+    /// The references as words.
+    #[inline(always)]
+    pub fn words<const W: usize>(refs: &[ChildRef; W]) -> &[u32; W] {
+        // SAFETY: a reference is a word and nothing else, by `repr(transparent)`.
+        unsafe { &*core::ptr::from_ref(refs).cast() }
+    }
+
     /// Kind and number of the block of a leaf.
     pub fn leaf_block(self) -> (u32, usize) {
         let kind = if self.0 & Self::SPHERES != 0 { KIND_SPHERES } else { KIND_TRIANGLES };

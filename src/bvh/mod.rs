@@ -1,13 +1,16 @@
 //! A bounding volume hierarchy: a binary tree of 32-byte nodes over the leaf blocks.
 
 mod build;
+mod stack;
 mod traverse;
 mod tree;
 mod validate;
+mod wide;
 
 pub(crate) use build::{build, needs};
 pub(crate) use traverse::traverse;
 pub(crate) use validate::tree_is_sound;
+pub(crate) use wide::traverse_wide;
 
 /// No path from the root is longer, whatever the scene, so a stack of this many entries suffices.
 ///

@@ -5,12 +5,15 @@ use crate::block::BvhNode;
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
 use crate::ray::{PreparedRay, Slab};
+use crate::simd::Simd;
 
 /// Offers `query` everything the ray meets, near nodes first; true when it ended the search.
 ///
 /// The stack holds at most one sibling a level, so it cannot overflow on a tree that is no deeper
 /// than [`MAX_DEPTH`]; deeper ones are refused when a block is opened.
-pub(crate) fn traverse<Q: Query>(
+#[inline(always)]
+pub(crate) fn traverse<S: Simd, Q: Query>(
+    s: S,
     nodes: &[BvhNode],
     leaves: &Leaves,
     ray: &PreparedRay,
@@ -25,7 +28,7 @@ pub(crate) fn traverse<Q: Query>(
     }
     loop {
         if node.is_leaf() {
-            if leaves.intersect(node.leaf(), ray, query) {
+            if leaves.intersect(s, node.leaf(), ray, query) {
                 return true;
             }
         } else if let Some(child) = nearer_child(nodes, node.first, slab, query, &mut stack) {
@@ -40,6 +43,7 @@ pub(crate) fn traverse<Q: Query>(
 }
 
 /// The nearer of two children that the ray meets; the other one goes on the stack.
+#[inline(always)]
 fn nearer_child<'n, Q: Query>(
     nodes: &'n [BvhNode],
     first: u32,

@@ -5,6 +5,7 @@ use super::walk::{Cells, visit};
 use crate::math::rounding::UNIT;
 use crate::query::Query;
 use crate::ray::{Interval, PreparedRay, WideSlab};
+use crate::simd::Simd;
 
 /// Offers `query` what is listed in each cell that the ray comes near, layer by layer along its fastest
 /// axis; true when that ended the search.
@@ -13,7 +14,8 @@ use crate::ray::{Interval, PreparedRay, WideSlab};
 /// passed, are off by at most `6 u C` cells as in [`Steps`](super::steps::Steps). The ray is therefore taken
 /// as `16 u C` cells thick, which may be many; when it is thicker than half the grid every block is
 /// tested through its box instead.
-pub(super) fn sweep<Q: Query>(
+pub(super) fn sweep<S: Simd, Q: Query>(
+    s: S,
     cells: &Cells,
     cell_ray: &CellRay,
     part: Interval<f64>,
@@ -25,7 +27,7 @@ pub(super) fn sweep<Q: Query>(
     let widest = resolution[0].max(resolution[1]).max(resolution[2]);
     // Written so that a NaN or an infinity comes here.
     if !(2.0 * pad < f64::from(widest)) {
-        return cells.leaves.intersect_all(ray, &WideSlab::new(ray), query);
+        return cells.leaves.intersect_all(s, ray, &WideSlab::new(ray), query);
     }
     let major = cell_ray.major();
     let layers = resolution[major];
@@ -42,7 +44,7 @@ pub(super) fn sweep<Q: Query>(
         }
         let mut ranges = [0, 1, 2].map(|k| cells_at(cell_ray, k, times, pad));
         ranges[major] = [layer, layer];
-        if visit_all(cells, ranges, ray, query) {
+        if visit_all(s, cells, ranges, ray, query) {
             return true;
         }
     }
@@ -65,12 +67,14 @@ fn cells_at(ray: &CellRay, axis: usize, times: Interval<f64>, pad: f64) -> [u32;
     [((a.min(b) - pad) as u32).min(last), ((a.max(b) + pad) as u32).min(last)]
 }
 
-fn visit_all<Q: Query>(
+fn visit_all<S: Simd, Q: Query>(
+    s: S,
     cells: &Cells,
     [x, y, z]: [[u32; 2]; 3],
     ray: &PreparedRay,
     query: &mut Q,
 ) -> bool {
-    (z[0]..=z[1])
-        .any(|k| (y[0]..=y[1]).any(|j| (x[0]..=x[1]).any(|i| visit(cells, [i, j, k], ray, query))))
+    (z[0]..=z[1]).any(|k| {
+        (y[0]..=y[1]).any(|j| (x[0]..=x[1]).any(|i| visit(s, cells, [i, j, k], ray, query)))
+    })
 }

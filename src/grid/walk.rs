@@ -7,6 +7,7 @@ use crate::block::cells::{EMPTY, GridHead, Run, run_start};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
 use crate::ray::{PreparedRay, WideSlab};
+use crate::simd::Simd;
 
 /// The parts of a block that a walk reads.
 #[derive(Clone, Copy)]
@@ -24,7 +25,13 @@ pub(crate) struct Cells<'m> {
 /// meets at `t` is in the list of a cell that the walk is in at `t`: primitives are listed in every cell
 /// within [`DILATION`](super::DILATION) of their box, and stepping errs by less. The hit need not lie in
 /// that cell, and nothing here asks it to.
-pub(crate) fn walk<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool {
+#[inline(always)]
+pub(crate) fn walk<S: Simd, Q: Query>(
+    s: S,
+    cells: &Cells,
+    ray: &PreparedRay,
+    query: &mut Q,
+) -> bool {
     let slab = WideSlab::new(ray);
     let (lower, upper) = cells.head.corners();
     let part = slab.clip(lower, upper, f64::from(query.t_bound()));
@@ -33,23 +40,25 @@ pub(crate) fn walk<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) ->
     }
     let cell_ray = CellRay::new(cells.head, ray);
     if cell_ray.steps_safely::<f32>() {
-        step(cells, Steps::<f32>::new(&cell_ray, part), ray, query)
+        step(s, cells, Steps::<f32>::new(&cell_ray, part), ray, query)
     } else if cell_ray.steps_safely::<f64>() {
-        step(cells, Steps::<f64>::new(&cell_ray, part), ray, query)
+        step(s, cells, Steps::<f64>::new(&cell_ray, part), ray, query)
     } else {
-        sweep(cells, &cell_ray, part, ray, query)
+        sweep(s, cells, &cell_ray, part, ray, query)
     }
 }
 
 /// From cell to cell until the ray leaves the grid or the bound.
-fn step<Q: Query, F: Real>(
+#[inline(always)]
+fn step<S: Simd, Q: Query, F: Real>(
+    s: S,
     cells: &Cells,
     mut steps: Steps<F>,
     ray: &PreparedRay,
     query: &mut Q,
 ) -> bool {
     loop {
-        if visit(cells, steps.cell, ray, query) {
+        if visit(s, cells, steps.cell, ray, query) {
             return true;
         }
         if !steps.advance(F::above(query.t_bound())) {
@@ -59,7 +68,9 @@ fn step<Q: Query, F: Real>(
 }
 
 /// Offers `query` what the ray meets among the primitives listed in a cell.
-pub(super) fn visit<Q: Query>(
+#[inline(always)]
+pub(super) fn visit<S: Simd, Q: Query>(
+    s: S,
     cells: &Cells,
     cell: [u32; 3],
     ray: &PreparedRay,
@@ -69,7 +80,7 @@ pub(super) fn visit<Q: Query>(
     let word = cells.words.get(cells.head.word(cell)).copied().unwrap_or(EMPTY);
     let Some(first) = run_start(word) else { return false };
     for run in cells.runs.get(first..).unwrap_or(&[]) {
-        if cells.leaves.intersect(run.leaf(), ray, query) {
+        if cells.leaves.intersect(s, run.leaf(), ray, query) {
             return true;
         }
         if run.is_last() {

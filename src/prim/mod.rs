@@ -2,8 +2,6 @@
 
 mod gather;
 mod pack;
-mod sphere;
-mod triangle;
 mod validate;
 
 pub(crate) use gather::{Shape, Survey, for_each_prim, geometries, shape, survey};
@@ -11,9 +9,10 @@ pub(crate) use pack::Packer;
 pub(crate) use validate::leaves_are_sound;
 
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SphereBlock, TriangleBlock};
-use crate::query::{Query, Watch};
+use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab};
-use triangle::Depths;
+use crate::sieve::{self, Depths};
+use crate::simd::Simd;
 
 /// The leaf blocks of one accel.
 #[derive(Clone, Copy)]
@@ -25,20 +24,24 @@ pub(crate) struct Leaves<'m> {
 
 impl Leaves<'_> {
     /// Offers `query` what the ray meets among the lanes of `leaf`; true when it wants no more.
-    pub fn intersect<Q: Query>(&self, leaf: LeafRef, ray: &PreparedRay, query: &mut Q) -> bool {
-        let number = leaf.number();
-        let halves = [(number, leaf.lanes & 0xFFFF), (number + 1, leaf.lanes >> 16)];
-        for (number, lanes) in halves {
-            if lanes != 0 && self.intersect_block(leaf.kind(), number, lanes, ray, query) {
-                return true;
-            }
-        }
-        false
+    #[inline(always)]
+    pub fn intersect<S: Simd, Q: Query>(
+        &self,
+        s: S,
+        leaf: LeafRef,
+        ray: &PreparedRay,
+        query: &mut Q,
+    ) -> bool {
+        let (kind, number) = (leaf.kind(), leaf.number());
+        let (lanes, next) = (leaf.lanes & 0xFFFF, leaf.lanes >> 16);
+        (lanes != 0 && self.intersect_block(s, kind, number, lanes, ray, query))
+            || (next != 0 && self.intersect_block(s, kind, number + 1, next, ray, query))
     }
 
     /// Offers `query` what the ray meets in any block: the traversal of a plain list.
-    pub fn intersect_all<Q: Query>(
+    pub fn intersect_all<S: Simd, Q: Query>(
         &self,
+        s: S,
         ray: &PreparedRay,
         slab: &impl Slab,
         query: &mut Q,
@@ -47,55 +50,87 @@ impl Leaves<'_> {
             query.watch().step();
             let part = slab.part(&block.aabb, query.t_bound());
             if !part.is_empty()
-                && self.intersect_block(KIND_TRIANGLES, number, block.lanes(), ray, query)
+                && self.intersect_block(s, KIND_TRIANGLES, number, block.lanes(), ray, query)
             {
                 return true;
             }
         }
         (0..self.sphere_blocks.len()).any(|number| {
             let lanes = self.sphere_blocks[number].lanes();
-            self.intersect_block(KIND_SPHERES, number, lanes, ray, query)
+            self.intersect_block(s, KIND_SPHERES, number, lanes, ray, query)
         })
     }
 
-    fn intersect_block<Q: Query>(
+    /// Offers `query` what the ray meets in a block of a wide BVH, all of which is one leaf.
+    #[inline(always)]
+    pub fn intersect_whole<S: Simd, Q: Query>(
         &self,
+        s: S,
+        (kind, number): (u32, usize),
+        ray: &PreparedRay,
+        query: &mut Q,
+    ) -> bool {
+        self.intersect_block(s, kind, number, u32::MAX, ray, query)
+    }
+
+    /// Offers `query` what the ray meets among those of `lanes` that are in use.
+    #[inline(always)]
+    fn intersect_block<S: Simd, Q: Query>(
+        &self,
+        s: S,
         kind: u32,
         number: usize,
         lanes: u32,
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
-        query.watch().block(lanes.count_ones());
-        match kind {
-            KIND_TRIANGLES => self
-                .triangle_blocks
-                .get(number)
-                .is_some_and(|block| self.triangles(block, number, lanes, ray, query)),
-            KIND_SPHERES => self
-                .sphere_blocks
-                .get(number)
-                .is_some_and(|block| self.spheres(block, number, lanes, ray, query)),
-            _ => false,
+        if kind == KIND_TRIANGLES {
+            let Some(block) = self.triangle_blocks.get(number) else { return false };
+            self.triangles(s, block, number, lanes & block.lanes(), ray, query)
+        } else if kind == KIND_SPHERES {
+            let Some(block) = self.sphere_blocks.get(number) else { return false };
+            self.spheres(block, number, lanes & block.lanes(), ray, query)
+        } else {
+            false
         }
     }
 
-    fn triangles<Q: Query>(
+    #[inline(always)]
+    fn triangles<S: Simd, Q: Query>(
         &self,
+        s: S,
         block: &TriangleBlock,
         number: usize,
         lanes: u32,
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
-        let depths = Depths::new(ray, query.t_bound());
-        Lanes(lanes & block.lanes()).any(|lane| {
-            let (place, prim) = ((number as u32, lane as u32), self.prim_id(block.first, lane));
-            triangle::lane(ray, &depths, block, place, prim)
-                .is_some_and(|lane| query.triangle(ray, &lane))
-        })
+        query.watch().block(lanes.count_ones());
+        let t_bound = query.t_bound();
+        let found = sieve::triangles(s, ray, &Depths::new(ray, t_bound), block, lanes);
+        for lane in Lanes(found.candidates & lanes) {
+            let corners = block.triangle(lane);
+            // What was found in a lane before may already be nearer.
+            let bound = query.t_bound();
+            if bound < t_bound && !sieve::is_candidate(ray, &Depths::new(ray, bound), corners) {
+                continue;
+            }
+            let has = |mask: u32| mask >> lane & 1 == 1;
+            let lane = TriangleLane {
+                corners,
+                prim: self.prim_id(block.first, lane),
+                place: (number as u32, lane as u32),
+                sure: has(found.sure),
+                inside: has(found.inside),
+            };
+            if query.triangle(ray, &lane) {
+                return true;
+            }
+        }
+        false
     }
 
+    #[inline(never)]
     fn spheres<Q: Query>(
         &self,
         block: &SphereBlock,
@@ -104,11 +139,14 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
-        let t_bound = query.t_bound();
-        Lanes(lanes & block.lanes()).any(|lane| {
-            let (place, prim) = ((number as u32, lane as u32), self.prim_id(block.first, lane));
-            sphere::lane(ray, t_bound, block, place, prim)
-                .is_some_and(|lane| query.sphere(ray, &lane))
+        query.watch().block(lanes.count_ones());
+        Lanes(lanes).any(|lane| {
+            let (centre, radius) = block.sphere(lane);
+            sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
+                let prim = self.prim_id(block.first, lane);
+                let place = (number as u32, lane as u32);
+                query.sphere(ray, &SphereLane { centre, radius, prim, place, detail })
+            })
         })
     }
 

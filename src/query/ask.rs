@@ -35,6 +35,8 @@ impl<'m, D: Decide, W: Watch> Closest<'m, D, W> {
 
 impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
     type Watch = W;
+    const FUSED: bool = D::FUSED;
+    const ORDERED: bool = true;
 
     fn t_bound(&self) -> f32 {
         self.t_bound
@@ -44,7 +46,6 @@ impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
         // What was offered once is not computed again.
         let known = self.best.as_ref().is_some_and(|best| best.prim() == lane.prim);
         if !known
-            && lane.nearest <= self.t_bound
             && self.filter.sees(lane.prim, true)
             && let Some(met) = D::triangle(ray, lane, &mut self.watch)
         {
@@ -85,6 +86,8 @@ impl<'m, D: Decide, W: Watch> Any<'m, D, W> {
 
 impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
     type Watch = W;
+    const FUSED: bool = D::FUSED;
+    const ORDERED: bool = false;
 
     fn t_bound(&self) -> f32 {
         self.t_max
@@ -94,9 +97,9 @@ impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
         if !self.filter.sees(lane.prim, true) {
             return false;
         }
-        // No `t` is needed of what is surely hit.
-        if lane.inside {
-            return self.filter.faces(lane.front);
+        // Neither `t` nor side is needed of what is surely hit.
+        if lane.inside && self.filter.both_sides() {
+            return true;
         }
         D::triangle(ray, lane, &mut self.watch).is_some_and(|met| self.filter.faces(met.front()))
     }
@@ -135,6 +138,8 @@ impl<D: Decide> Locate<D> {
 
 impl<D: Decide> Query for Locate<D> {
     type Watch = ();
+    const FUSED: bool = D::FUSED;
+    const ORDERED: bool = true;
 
     fn t_bound(&self) -> f32 {
         self.t_max

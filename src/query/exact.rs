@@ -101,6 +101,7 @@ impl ExactMemory {
 
 impl Decide for Exact {
     type Met = ExactMet;
+    const FUSED: bool = true;
     type Memory = ExactMemory;
 
     fn triangle(

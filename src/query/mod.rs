@@ -1,6 +1,6 @@
 //! What a ray may ask: its options, and the traversal's side of the question.
 //!
-//! A traversal offers lanes of leaf blocks that the filter of [`prim`](crate::prim) could not reject. How
+//! A traversal offers lanes of leaf blocks that the [`sieve`](crate::sieve) could not reject. How
 //! a lane is decided is a [`Decide`]: [`Exact`] or [`Watertight`]. What is made of those that are met
 //! is a [`Query`]: [`Closest`], [`Any`] or [`Locate`]. Each question goes with each precision.
 
@@ -16,6 +16,7 @@ pub(crate) use options::{Filter, flat_number, geometry_of};
 pub(crate) use watertight::Watertight;
 
 use crate::ray::{Interval, PreparedRay};
+use crate::sieve::SphereDetail;
 
 /// What a query did, for charts and heat maps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -73,7 +74,7 @@ impl Watch for &mut Counts {
     }
 }
 
-/// A triangle that the filter could not reject. Depths and `t` are those of the frame.
+/// A triangle that the filter could not reject.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleLane {
     pub corners: [[f32; 3]; 3],
@@ -85,14 +86,6 @@ pub(crate) struct TriangleLane {
     pub sure: bool,
     /// And the real `t` is within the ray's limits.
     pub inside: bool,
-    /// Whether the line meets the front; right when `sure`.
-    pub front: bool,
-    /// Not above the real `t`, if the triangle is met.
-    pub nearest: f32,
-    /// The `t` computed in `f32`, between those of the nearest and the farthest vertex.
-    pub t: f32,
-    /// Weights of the second and the third vertex, computed in `f32`.
-    pub weights: [f32; 2],
 }
 
 /// A sphere that the filter could not reject.
@@ -102,18 +95,19 @@ pub(crate) struct SphereLane {
     pub radius: f32,
     pub prim: u32,
     pub place: (u32, u32),
-    /// The two `t` in the frame computed in `f32`, in order.
-    pub t: [f32; 2],
-    /// A bound on the error of both.
-    pub t_error: f32,
-    /// Whether the second of them is nearer to zero.
-    pub far_is_nearest: bool,
+    pub detail: SphereDetail,
 }
 
 /// The question a traversal answers: it offers lanes and obeys the bound. The same lane may come
 /// twice.
 pub(crate) trait Query {
     type Watch: Watch;
+
+    /// Whether nodes may be tested with fused operations: not where that could change the answer.
+    const FUSED: bool;
+
+    /// Whether near nodes had better come first.
+    const ORDERED: bool;
 
     /// Nothing beyond this `t` of the frame is of interest any more.
     fn t_bound(&self) -> f32;
@@ -131,6 +125,9 @@ pub(crate) trait Query {
 pub(crate) trait Decide {
     /// A meeting of the ray with a primitive, within the ray's limits as far as this can tell.
     type Met: Copy + Meets;
+
+    /// Whether the answer is the same however conservatively nodes are tested.
+    const FUSED: bool;
 
     /// The meeting with a triangle of which the filter is not sure.
     fn triangle(

@@ -75,6 +75,11 @@ impl<'m> Filter<'m> {
         !(skippable && prim == self.skip) && (self.mask == 0 || self.mask_sees(prim))
     }
 
+    /// Whether meetings with either side count.
+    pub fn both_sides(&self) -> bool {
+        self.facing == Facing::Both
+    }
+
     /// Whether a meeting with this side counts.
     pub fn faces(&self, front: bool) -> bool {
         match self.facing {

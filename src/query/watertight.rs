@@ -2,6 +2,7 @@
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
 use crate::ray::PreparedRay;
+use crate::sieve;
 
 /// Nothing that the ray hits is missed: what the filter could not reject is met. Of two meetings
 /// the one with the smaller computed `t` comes first.
@@ -43,6 +44,7 @@ impl Meets for WatertightMet {
 
 impl Decide for Watertight {
     type Met = WatertightMet;
+    const FUSED: bool = false;
     type Memory = ();
 
     fn triangle(
@@ -50,12 +52,13 @@ impl Decide for Watertight {
         lane: &TriangleLane,
         _: &mut impl Watch,
     ) -> Option<WatertightMet> {
+        let detail = sieve::detail(ray, lane.corners);
         Some(WatertightMet {
-            t: limited(ray, lane.t),
-            weights: lane.weights,
+            t: limited(ray, detail.t),
+            weights: detail.weights,
             prim: lane.prim,
             place: lane.place,
-            front: lane.front,
+            front: detail.front,
             root: 0,
             skippable: true,
         })
@@ -66,9 +69,9 @@ impl Decide for Watertight {
         lane: &SphereLane,
         _: &mut impl Watch,
     ) -> [Option<WatertightMet>; 2] {
-        let nearest = usize::from(lane.far_is_nearest);
+        let nearest = usize::from(lane.detail.far_is_nearest);
         [0, 1].map(|root| {
-            let (t, slack) = (lane.t[root], lane.t_error);
+            let (t, slack) = (lane.detail.t[root], lane.detail.t_error);
             // Written so that a NaN stays.
             if t + slack < ray.t_min || t - slack > ray.t_max {
                 return None;
@@ -80,7 +83,7 @@ impl Decide for Watertight {
                 place: lane.place,
                 front: root == 0,
                 root,
-                skippable: root == nearest || lane.t[0] == lane.t[1],
+                skippable: root == nearest || lane.detail.t[0] == lane.detail.t[1],
             })
         })
     }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::{Interval, PreparedRay};
 use crate::math::rounding::{UNIT32, f32_above, f32_below, gamma};
 use crate::math::{Aabb, wide};
+use crate::simd::{Lanes, Width};
 
 /// A ray made ready for boxes.
 ///
@@ -16,6 +17,14 @@ use crate::math::{Aabb, wide};
 pub(crate) trait Slab {
     /// The part of the ray inside the box.
     fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32>;
+
+    /// The lanes whose boxes the ray enters, and where. `walls` are lower x y z, then upper x y z.
+    fn lanes<S: Width<N>, const FUSED: bool, const N: usize>(
+        &self,
+        s: S,
+        walls: &[[f32; N]; 6],
+        t_bound: f32,
+    ) -> (u32, S::V);
 }
 
 /// Boxes in `f32`, for frames whose exponent is between -60 and 120.
@@ -27,6 +36,8 @@ pub(crate) struct NarrowSlab {
     near_shift: [f32; 3],
     far_shift: [f32; 3],
     t_min: f32,
+    /// For each axis the number of the wall through which the ray enters, and of the other.
+    order: [[usize; 2]; 3],
 }
 
 impl NarrowSlab {
@@ -52,6 +63,8 @@ impl NarrowSlab {
             near_shift: [0, 1, 2].map(|k| shift(k, 1.0)),
             far_shift: [0, 1, 2].map(|k| shift(k, -1.0)),
             t_min: ray.t_min,
+            order: [0, 1, 2]
+                .map(|k| if inverse[k].is_sign_negative() { [k + 3, k] } else { [k, k + 3] }),
         })
     }
 }
@@ -71,6 +84,27 @@ impl Slab for NarrowSlab {
             far = if leave < far { leave } else { far };
         }
         Interval { near, far }
+    }
+
+    #[inline(always)]
+    fn lanes<S: Width<N>, const FUSED: bool, const N: usize>(
+        &self,
+        s: S,
+        walls: &[[f32; N]; 6],
+        t_bound: f32,
+    ) -> (u32, S::V) {
+        let (mut near, mut far) = (s.splat(self.t_min), s.splat(t_bound));
+        for k in 0..3 {
+            let r = s.splat(self.reciprocal[k]);
+            let distance = |wall: usize, shift: f32| {
+                let (wall, shift) = (s.load(&walls[wall]), s.splat(shift));
+                if FUSED { wall.fast_mul_sub(r, shift) } else { wall.mul(r).sub(shift) }
+            };
+            let [first, last] = self.order[k];
+            near = distance(first, self.near_shift[k]).max(near);
+            far = distance(last, self.far_shift[k]).min(far);
+        }
+        (near.less_or_equal(far), near)
     }
 }
 
@@ -127,6 +161,25 @@ impl Slab for WideSlab {
     fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
         let part = self.clip(wide(aabb.lower), wide(aabb.upper), f64::from(t_bound));
         Interval { near: f32_below(part.near), far: f32_above(part.far) }
+    }
+
+    fn lanes<S: Width<N>, const FUSED: bool, const N: usize>(
+        &self,
+        s: S,
+        walls: &[[f32; N]; 6],
+        t_bound: f32,
+    ) -> (u32, S::V) {
+        let (mut mask, mut near) = (0, [0.0; N]);
+        for (lane, near) in near.iter_mut().enumerate() {
+            let corner = |first: usize| [0, 1, 2].map(|k| walls[first + k][lane]);
+            let aabb = Aabb { lower: corner(0), upper: corner(3) };
+            let part = self.part(&aabb, t_bound);
+            // A lane without a child is an empty box with infinite walls.
+            let entered = !part.is_empty() && aabb.lower[0] <= aabb.upper[0];
+            mask |= u32::from(entered) << lane;
+            *near = part.near;
+        }
+        (mask, s.load(&near))
     }
 }
 

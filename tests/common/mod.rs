@@ -2,15 +2,23 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
-use raykern::{Accel, BuildOptions, Hit, OwnedAccel, PlainList, QueryOptions, Ray, Scene};
+use raykern::{Accel, Backend, BuildOptions, Hit, OwnedAccel, PlainList, QueryOptions, Ray, Scene};
 use raykern_harness::make;
 use raykern_harness::model::Model;
 
 /// List, grid and BVH over one scene, each forced.
 pub struct All([(&'static str, OwnedAccel); 3]);
 
+/// Uses the backend that the environment's `RAYKERN_BACKEND` names, if it names one.
+pub fn choose_backend() {
+    let Ok(name) = std::env::var("RAYKERN_BACKEND") else { return };
+    let backend = Backend::ALL.into_iter().find(|b| format!("{b:?}").eq_ignore_ascii_case(&name));
+    backend.unwrap_or_else(|| panic!("no backend {name}: {:?}", Backend::ALL)).force();
+}
+
 impl All {
     pub fn build(scene: &Scene) -> Self {
+        choose_backend();
         let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
         let never = with(PlainList::Never);
         All([

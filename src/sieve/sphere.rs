@@ -1,9 +1,7 @@
 //! The filter of spheres, in `f32`: it rejects what the ray surely does not meet.
 
-use crate::block::leaf::SphereBlock;
 use crate::math::float::sqrt32;
 use crate::math::rounding::UNIT32;
-use crate::query::SphereLane;
 use crate::ray::PreparedRay;
 
 /// Far below every bound on squares in the frame, and far above what underflow can take away.
@@ -17,21 +15,30 @@ fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
-/// The sphere in a lane, unless the ray surely does not meet it within its limits and up to the
+/// One sphere in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SphereDetail {
+    /// The two `t` in the frame, in order.
+    pub t: [f32; 2],
+    /// A bound on the error of both.
+    pub t_error: f32,
+    /// Whether the second of them is nearer to zero.
+    pub far_is_nearest: bool,
+}
+
+/// What the filter knows of a sphere, unless the ray surely does not meet it within its limits and up to the
 /// bound.
 ///
 /// The discriminant is taken at the point of the line nearest the centre, so that distance does not
 /// spoil it. Conservative for every finite sphere and prepared ray. No operation is fused.
 ///
 /// Source: \[HGA19\]; the bounds are those of the same computation in `f64`, with the unit of `f32`.
-pub(crate) fn lane(
+pub(crate) fn sphere(
     ray: &PreparedRay,
     t_bound: f32,
-    block: &SphereBlock,
-    place: (u32, u32),
-    prim: u32,
-) -> Option<SphereLane> {
-    let (centre, radius) = block.sphere(place.1 as usize);
+    centre: [f32; 3],
+    radius: f32,
+) -> Option<SphereDetail> {
     let (d, r) = (ray.direction, radius * ray.scale);
     let v = [0, 1, 2].map(|k| ray.origin[k] - centre[k] * ray.scale);
     let (a, b) = (dot(d, d), dot(v, d));
@@ -63,11 +70,7 @@ pub(crate) fn lane(
     // Infinite where the line touches the sphere at its origin.
     let from_power = 16.0 * UNIT32 * (reach * reach + r * r) / q.abs();
     let t_error = (most - least) + 64.0 * UNIT32 * (reach + r) + from_power;
-    Some(SphereLane {
-        centre,
-        radius,
-        prim,
-        place,
+    Some(SphereDetail {
         t: if large < small { [large, small] } else { [small, large] },
         t_error,
         far_is_nearest: b > 0.0,

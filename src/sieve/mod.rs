@@ -1,0 +1,7 @@
+//! The first look at the primitives of a leaf block, in `f32`: it only rejects.
+
+mod sphere;
+mod triangle;
+
+pub(crate) use sphere::{SphereDetail, sphere};
+pub(crate) use triangle::{Depths, detail, is_candidate, triangles};

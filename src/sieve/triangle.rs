@@ -1,0 +1,257 @@
+//! The filter of triangles, in `f32`: it rejects what the ray surely does not meet.
+
+use crate::block::leaf::TriangleBlock;
+use crate::math::rounding::UNIT32;
+use crate::ray::PreparedRay;
+use crate::simd::{Lanes, Scalar, Simd, Width};
+
+/// Far below every bound on coordinates in the frame, and far above what underflow can take away.
+const TINY: f32 = 1.0 / (1u128 << 100) as f32;
+
+/// The limits of one visit of a block, as depths of the sheared space.
+///
+/// The filter asks with the bound that held when the block was opened, whatever lanes before may have
+/// found since, so that all backends offer the same lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Depths {
+    low: f32,
+    high: f32,
+    /// What surely lies within both limits of the ray lies between these.
+    inside: [f32; 2],
+}
+
+impl Depths {
+    #[inline(always)]
+    pub fn new(ray: &PreparedRay, t_bound: f32) -> Self {
+        // A product rounds once; infinite depths stay as they are.
+        let rate = ray.shear.depth_rate;
+        let lower = |t: f32| t * rate - (t * rate).abs() * (4.0 * UNIT32);
+        let upper = |t: f32| t * rate + (t * rate).abs() * (4.0 * UNIT32);
+        Depths {
+            low: lower(ray.t_min),
+            high: upper(t_bound),
+            inside: [upper(ray.t_inside[0]), lower(ray.t_inside[1])],
+        }
+    }
+}
+
+/// Vertices in the sheared space: the ray is the line x = y = 0, and depth grows along it.
+#[derive(Clone, Copy)]
+struct Sheared<V> {
+    x: V,
+    y: V,
+    /// Depth from the frame's zero, without rounding.
+    raw: V,
+    /// Depth from the ray's origin.
+    depth: V,
+}
+
+impl<V: Copy> Sheared<V> {
+    /// From given coordinates, an array for each axis.
+    #[inline(always)]
+    fn new<S: Width<N, V = V>, const N: usize>(
+        s: S,
+        ray: &PreparedRay,
+        vertices: &[[f32; N]; 3],
+    ) -> Self
+    where
+        V: Lanes<N>,
+    {
+        let shear = &ray.shear;
+        let [kx, ky, kz] = shear.axes;
+        let scale = s.splat(ray.scale);
+        let raw = s.load(&vertices[kz]).mul(s.splat(ray.scale * shear.depth_sign));
+        let depth = raw.sub(s.splat(ray.origin[kz] * shear.depth_sign));
+        let across = |axis: usize, slope: f32| {
+            let from_origin = s.load(&vertices[axis]).mul(scale).sub(s.splat(ray.origin[axis]));
+            from_origin.sub(s.splat(slope).mul(depth))
+        };
+        Sheared { x: across(kx, shear.slope[0]), y: across(ky, shear.slope[1]), raw, depth }
+    }
+
+    #[inline(always)]
+    fn map<const N: usize>(self, f: impl Fn(V) -> V) -> Self {
+        Sheared { x: f(self.x), y: f(self.y), raw: f(self.raw), depth: f(self.depth) }
+    }
+
+    /// Twice the area that the ray's point spans with two vertices.
+    #[inline(always)]
+    fn area<const N: usize>(&self, next: &Self) -> V
+    where
+        V: Lanes<N>,
+    {
+        self.x.mul(next.y).sub(self.y.mul(next.x))
+    }
+}
+
+/// What the filter computes of each lane.
+struct Sieved<V> {
+    /// Lanes that the ray surely does not meet within its limits and up to the bound.
+    rejected: u32,
+    /// Lanes between whose edges the ray's line surely passes.
+    sure: u32,
+    /// Those of them whose real `t` surely is within the ray's limits.
+    inside: u32,
+    over_b: V,
+    over_c: V,
+    total: V,
+    /// The depth of the meeting, from that of the first vertex, times the size of `total`.
+    rise: V,
+    first_depth: V,
+    nearest_depth: V,
+    farthest_depth: V,
+}
+
+/// The filter for the triangles with these corners, one a lane.
+///
+/// Conservative for every finite triangle and prepared ray: what is rejected is not met in real
+/// arithmetic, and `sure` and `inside` are only said of what is so. All bounds are for a lane
+/// alone: they grow with the triangle's own size in the sheared plane and its own depth. No operation
+/// is fused, so every backend computes the same bits. `docs/METHODS.md` derives the constants.
+///
+/// Source: \[WBW13\] for the shear; the bounds are our own.
+#[inline(always)]
+fn sieve<S: Width<N>, const N: usize>(
+    s: S,
+    ray: &PreparedRay,
+    depths: &Depths,
+    [a, b, c]: [Sheared<S::V>; 3],
+) -> Sieved<S::V> {
+    let nearest_depth = a.depth.min(b.depth).min(c.depth);
+    let farthest_depth = a.depth.max(b.depth).max(c.depth);
+    let slack = s.splat(2.0 * UNIT32);
+    let (high, low) = (s.splat(depths.high), s.splat(depths.low));
+    let too_far = high.less(nearest_depth.sub(nearest_depth.abs().mul(slack)));
+    let too_near = farthest_depth.add(farthest_depth.abs().mul(slack)).less(low);
+    // Each area over the vertex opposite to it.
+    let (over_a, over_b, over_c) = (b.area(&c), c.area(&a), a.area(&b));
+    let in_plane = |v: &Sheared<S::V>| v.x.abs().max(v.y.abs());
+    let size = in_plane(&a).max(in_plane(&b)).max(in_plane(&c));
+    let deepest = nearest_depth.abs().max(farthest_depth.abs());
+    // The error of a coordinate, and that of an area.
+    let shift = size
+        .mul(s.splat(2.5 * UNIT32))
+        .add(deepest.mul(s.splat(5.5 * UNIT32 * ray.shear.steepness)));
+    let area_error = shift
+        .mul(size.mul(s.splat(4.0)).add(shift.mul(s.splat(2.0))))
+        .add(size.mul(size).mul(s.splat(4.5 * UNIT32)))
+        .add(s.splat(TINY));
+    let minus_error = s.splat(0.0).sub(area_error);
+    let least = over_a.min(over_b).min(over_c);
+    let most = over_a.max(over_b).max(over_c);
+    let outside = least.less(minus_error) & area_error.less(most);
+    let sure = area_error.less(least) | most.less(minus_error);
+    let total = over_a.add(over_b).add(over_c);
+    let size_of_total = total.abs();
+    let (to_b, to_c) = (b.raw.sub(a.raw), c.raw.sub(a.raw));
+    let rise = over_b.mul(to_b).add(over_c.mul(to_c)).flipped_by(total);
+    let span = to_b.abs().max(to_c.abs());
+    let error = area_error
+        .mul(span.mul(s.splat(20.0)))
+        .add(a.depth.abs().add(span).mul(size_of_total).mul(s.splat(5.0 * UNIT32)))
+        .add(s.splat(TINY));
+    let beyond = |depth: f32| rise.sub(s.splat(depth).sub(a.depth).mul(size_of_total));
+    let minus_error = s.splat(0.0).sub(error);
+    let past_high = error.less(beyond(depths.high));
+    let before_low = beyond(depths.low).less(minus_error);
+    let inside_high = beyond(depths.inside[1]).less(minus_error);
+    let inside_low = error.less(beyond(depths.inside[0]));
+    Sieved {
+        rejected: too_far | too_near | outside | past_high | before_low,
+        sure,
+        inside: sure & inside_high & inside_low,
+        over_b,
+        over_c,
+        total,
+        rise,
+        first_depth: a.depth,
+        nearest_depth,
+        farthest_depth,
+    }
+}
+
+/// What is left of a block, one bit a lane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Triangles {
+    /// Lanes that the filter could not reject, perhaps among them some that were not asked for.
+    pub candidates: u32,
+    pub sure: u32,
+    pub inside: u32,
+}
+
+/// The filter for the `lanes` of a block, all at once unless they are few for the backend.
+#[inline(always)]
+pub(crate) fn triangles<S: Simd>(
+    s: S,
+    ray: &PreparedRay,
+    depths: &Depths,
+    block: &TriangleBlock,
+    lanes: u32,
+) -> Triangles {
+    if S::FEW > 0 && lanes.count_ones() <= S::FEW {
+        return few(ray, depths, block, lanes);
+    }
+    let vertices = Sheared::new(s, ray, &block.vertices);
+    let corners = [0, 1, 2].map(|k| vertices.map::<16>(|v| s.corners(v, &block.corners[k])));
+    let Sieved { rejected, sure, inside, .. } = sieve::<S, 16>(s, ray, depths, corners);
+    Triangles { candidates: !rejected & 0xFFFF, sure, inside }
+}
+
+/// The filter, lane by lane.
+fn few(ray: &PreparedRay, depths: &Depths, block: &TriangleBlock, lanes: u32) -> Triangles {
+    let mut found = Triangles { candidates: 0, sure: 0, inside: 0 };
+    let mut rest = lanes;
+    while rest != 0 {
+        let lane = rest.trailing_zeros();
+        rest &= rest - 1;
+        let sieved = sieve_one(ray, depths, block.triangle(lane as usize));
+        found.candidates |= (!sieved.rejected & 1) << lane;
+        found.sure |= sieved.sure << lane;
+        found.inside |= sieved.inside << lane;
+    }
+    found
+}
+
+/// One triangle in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriangleDetail {
+    /// The frame's `t`, between those of the nearest and the farthest vertex.
+    pub t: f32,
+    /// Weights of the second and the third vertex.
+    pub weights: [f32; 2],
+    /// Whether the line meets the front; right where the filter is sure.
+    pub front: bool,
+}
+
+#[inline(always)]
+fn sieve_one(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Sieved<[f32; 1]> {
+    let corners = corners.map(|vertex| Sheared::new(Scalar, ray, &vertex.map(|x| [x])));
+    sieve::<Scalar, 1>(Scalar, ray, depths, corners)
+}
+
+/// Whether the filter cannot reject this triangle.
+pub(crate) fn is_candidate(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> bool {
+    sieve_one(ray, depths, corners).rejected == 0
+}
+
+/// What the filter knows of a triangle that it does not reject.
+pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
+    let sieved = sieve_one(ray, &Depths::new(ray, ray.t_max), corners);
+    let [over_b, over_c, total, rise, first, nearest, farthest] = [
+        sieved.over_b,
+        sieved.over_c,
+        sieved.total,
+        sieved.rise,
+        sieved.first_depth,
+        sieved.nearest_depth,
+        sieved.farthest_depth,
+    ]
+    .map(|[x]| x);
+    // A NaN, from 0 / 0, loses to the depths of the vertices.
+    let depth = (first + rise / total.abs()).max(nearest).min(farthest);
+    TriangleDetail {
+        t: depth / ray.shear.depth_rate,
+        weights: [over_b / total, over_c / total],
+        front: (total < 0.0) == (ray.shear.depth_sign > 0.0),
+    }
+}

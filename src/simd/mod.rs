@@ -1,0 +1,144 @@
+//! Vector instructions, and the choice of them: the only place that knows a processor.
+//!
+//! A *backend* is a token that can only be made where its instructions exist; vectors come from tokens, so
+//! whatever holds one may use them, and kernels are safe. Every operation means what [`Scalar`] does, special
+//! values included, so all backends compute the same bits.
+
+#![allow(unsafe_code, reason = "vector instructions are functions that need them")]
+
+mod scalar;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+use core::mem::MaybeUninit;
+use core::sync::atomic::{AtomicU8, Ordering};
+
+pub(crate) use scalar::Scalar;
+
+/// `N` floats side by side.
+pub(crate) trait Lanes<const N: usize>: Copy {
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    /// `if self < other { self } else { other }`: a NaN in `self` gives `other`.
+    fn min(self, other: Self) -> Self;
+    /// `if self > other { self } else { other }`: a NaN in `self` gives `other`.
+    fn max(self, other: Self) -> Self;
+    fn abs(self) -> Self;
+    /// `self`, with the other sign where `sign` is negative.
+    fn flipped_by(self, sign: Self) -> Self;
+    /// `self * factor - other`, with one rounding or two: not the same bits from every backend, so
+    /// only where the bound allows for both and nothing of it is answered.
+    fn fast_mul_sub(self, factor: Self, other: Self) -> Self;
+    /// One bit for each lane in which `self < other`, the first the lowest; none for NaN.
+    fn less(self, other: Self) -> u32;
+    /// One bit for each lane in which `self <= other`; none for NaN.
+    fn less_or_equal(self, other: Self) -> u32;
+    fn store(self, out: &mut [f32; N]);
+    /// Writes the lanes of `mask` in order to the front of `out`, and anything behind them.
+    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]);
+}
+
+/// A backend's vectors of `N` lanes.
+pub(crate) trait Width<const N: usize>: Copy {
+    type V: Lanes<N>;
+    fn splat(self, x: f32) -> Self::V;
+    fn load(self, lanes: &[f32; N]) -> Self::V;
+    /// Writes the words of `mask` in order to the front of `out`, and anything behind them.
+    fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]);
+}
+
+/// A backend: a proof that its instructions exist.
+pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
+    /// So few lanes of 16 are faster one by one.
+    const FEW: u32;
+
+    /// Lane `i` of the result is lane `corner(i)` of `table`, with the corners as a
+    /// [`TriangleBlock`](crate::block::leaf::TriangleBlock) lists them.
+    fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V;
+
+    /// Runs `kernel` with the backend's instructions; all that it inlines may use them.
+    fn run<R>(self, kernel: impl FnOnce(Self) -> R) -> R;
+}
+
+/// The vector instructions that queries use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Backend {
+    /// Portable code.
+    Scalar = 1,
+    /// 128 bits: SSE2.
+    Bits128 = 2,
+    /// 256 bits: AVX2 and FMA.
+    Avx2 = 3,
+    /// 512 bits: AVX-512 F, VL, DQ and BW.
+    Avx512 = 4,
+}
+
+impl Backend {
+    /// All of them, the lowest first.
+    pub const ALL: [Backend; 4] =
+        [Backend::Scalar, Backend::Bits128, Backend::Avx2, Backend::Avx512];
+
+    /// The best that this processor has.
+    pub fn detected() -> Backend {
+        #[cfg(target_arch = "x86_64")]
+        return x86::detect();
+        #[cfg(not(target_arch = "x86_64"))]
+        return Backend::Scalar;
+    }
+
+    /// What queries use now.
+    pub fn current() -> Backend {
+        match CHOICE.load(Ordering::Relaxed) {
+            1 => Backend::Scalar,
+            2 => Backend::Bits128,
+            3 => Backend::Avx2,
+            4 => Backend::Avx512,
+            _ => {
+                let best = Backend::detected();
+                CHOICE.store(best as u8, Ordering::Relaxed);
+                best
+            }
+        }
+    }
+
+    /// Lets queries of the whole process use this backend, or the best there is if it is less. For
+    /// tests and measurements: all backends give the same bits.
+    pub fn force(self) -> Backend {
+        let choice = self.min(Backend::detected());
+        CHOICE.store(choice as u8, Ordering::Relaxed);
+        choice
+    }
+}
+
+/// The one global of the library: asking the processor takes longer than a ray.
+static CHOICE: AtomicU8 = AtomicU8::new(0);
+
+/// Something to run with the backend of the moment.
+pub(crate) trait Kernel {
+    type Output;
+    fn run<S: Simd>(self, s: S) -> Self::Output;
+}
+
+/// Runs `kernel` with the best instructions there are.
+#[inline]
+pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    match Backend::current() {
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: `current` is never above what `detected` found on this processor.
+        Backend::Avx512 => unsafe { x86::Avx512::assume() }.run(|s| kernel.run(s)),
+        #[cfg(target_arch = "x86_64")]
+        // SAFETY: as above.
+        Backend::Avx2 => unsafe { x86::Avx2::assume() }.run(|s| kernel.run(s)),
+        #[cfg(target_arch = "x86_64")]
+        Backend::Bits128 => x86::Sse2.run(|s| kernel.run(s)),
+        _ => Scalar.run(|s| kernel.run(s)),
+    }
+}
+
+/// The place in a list of corners at which lane `i` stands: see `TriangleBlock`.
+fn corner(list: &[u8; 8], i: usize) -> usize {
+    let place = i % 2 * 8 + i / 2 % 8;
+    usize::from(list[place / 2] >> (4 * (place % 2)) & 15)
+}

@@ -1,0 +1,126 @@
+//! The reference: what every operation means.
+
+use core::mem::MaybeUninit;
+
+use super::{Lanes, Simd, Width, corner};
+
+/// Portable code, one lane after the other.
+#[derive(Clone, Copy)]
+pub(crate) struct Scalar;
+
+fn zip<const N: usize>(a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> f32) -> [f32; N] {
+    core::array::from_fn(|i| f(a[i], b[i]))
+}
+
+fn mask<const N: usize>(a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> bool) -> u32 {
+    (0..N).fold(0, |bits, i| bits | u32::from(f(a[i], b[i])) << i)
+}
+
+/// Writes those of `values` that `mask` names to the front of `out`.
+pub(super) fn compress<T: Copy, const N: usize>(
+    values: &[T; N],
+    mask: u32,
+    out: &mut [MaybeUninit<T>; N],
+) {
+    let mut rest = mask;
+    for out in out {
+        let Some(value) = values.get(rest.trailing_zeros() as usize) else { break };
+        out.write(*value);
+        rest &= rest.wrapping_sub(1);
+    }
+}
+
+impl<const N: usize> Lanes<N> for [f32; N] {
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        zip(self, other, |a, b| a + b)
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        zip(self, other, |a, b| a - b)
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        zip(self, other, |a, b| a * b)
+    }
+
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        zip(self, other, |a, b| if a < b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        zip(self, other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.map(f32::abs)
+    }
+
+    #[inline(always)]
+    fn flipped_by(self, sign: Self) -> Self {
+        zip(self, sign, |a, b| f32::from_bits(a.to_bits() ^ (b.to_bits() & 1 << 31)))
+    }
+
+    #[inline(always)]
+    fn fast_mul_sub(self, factor: Self, other: Self) -> Self {
+        self.mul(factor).sub(other)
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        mask(self, other, |a, b| a < b)
+    }
+
+    #[inline(always)]
+    fn less_or_equal(self, other: Self) -> u32 {
+        mask(self, other, |a, b| a <= b)
+    }
+
+    #[inline(always)]
+    fn store(self, out: &mut [f32; N]) {
+        *out = self;
+    }
+
+    #[inline(always)]
+    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]) {
+        compress(&self, mask, out);
+    }
+}
+
+impl<const N: usize> Width<N> for Scalar {
+    type V = [f32; N];
+
+    #[inline(always)]
+    fn splat(self, x: f32) -> [f32; N] {
+        [x; N]
+    }
+
+    #[inline(always)]
+    fn load(self, lanes: &[f32; N]) -> [f32; N] {
+        *lanes
+    }
+
+    #[inline(always)]
+    fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]) {
+        compress(words, mask, out);
+    }
+}
+
+impl Simd for Scalar {
+    const FEW: u32 = 8;
+
+    #[inline(always)]
+    fn corners(self, table: [f32; 16], list: &[u8; 8]) -> [f32; 16] {
+        core::array::from_fn(|i| table[corner(list, i)])
+    }
+
+    #[inline(always)]
+    fn run<R>(self, kernel: impl FnOnce(Self) -> R) -> R {
+        kernel(self)
+    }
+}
