@@ -14,6 +14,7 @@ use crate::simd::Simd;
 /// passed, are off by at most `6 u C` cells as in [`Steps`](super::steps::Steps). The ray is therefore taken
 /// as `16 u C` cells thick, which may be many; when it is thicker than half the grid every block is
 /// tested through its box instead.
+#[inline(always)]
 pub(super) fn sweep<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
@@ -67,6 +68,7 @@ fn cells_at(ray: &CellRay, axis: usize, times: Interval<f64>, pad: f64) -> [u32;
     [((a.min(b) - pad) as u32).min(last), ((a.max(b) + pad) as u32).min(last)]
 }
 
+#[inline(always)]
 fn visit_all<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
@@ -74,7 +76,14 @@ fn visit_all<S: Simd, Q: Query>(
     ray: &PreparedRay,
     query: &mut Q,
 ) -> bool {
-    (z[0]..=z[1]).any(|k| {
-        (y[0]..=y[1]).any(|j| (x[0]..=x[1]).any(|i| visit(s, cells, [i, j, k], ray, query)))
-    })
+    for k in z[0]..=z[1] {
+        for j in y[0]..=y[1] {
+            for i in x[0]..=x[1] {
+                if visit(s, cells, [i, j, k], ray, query) {
+                    return true;
+                }
+            }
+        }
+    }
+    false
 }

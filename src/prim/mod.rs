@@ -39,6 +39,7 @@ impl Leaves<'_> {
     }
 
     /// Offers `query` what the ray meets in any block: the traversal of a plain list.
+    #[inline(always)]
     pub fn intersect_all<S: Simd, Q: Query>(
         &self,
         s: S,
@@ -55,10 +56,12 @@ impl Leaves<'_> {
                 return true;
             }
         }
-        (0..self.sphere_blocks.len()).any(|number| {
-            let lanes = self.sphere_blocks[number].lanes();
-            self.intersect_block(s, KIND_SPHERES, number, lanes, ray, query)
-        })
+        for (number, block) in self.sphere_blocks.iter().enumerate() {
+            if self.intersect_block(s, KIND_SPHERES, number, block.lanes(), ray, query) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Offers `query` what the ray meets in a block of a wide BVH, all of which is one leaf.

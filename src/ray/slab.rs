@@ -96,13 +96,16 @@ impl Slab for NarrowSlab {
         let (mut near, mut far) = (s.splat(self.t_min), s.splat(t_bound));
         for k in 0..3 {
             let r = s.splat(self.reciprocal[k]);
-            let distance = |wall: usize, shift: f32| {
-                let (wall, shift) = (s.load(&walls[wall]), s.splat(shift));
-                if FUSED { wall.fast_mul_sub(r, shift) } else { wall.mul(r).sub(shift) }
+            let (near_shift, far_shift) = (s.splat(self.near_shift[k]), s.splat(self.far_shift[k]));
+            let (first, last) =
+                (s.load(&walls[self.order[k][0]]), s.load(&walls[self.order[k][1]]));
+            let (enter, leave) = if FUSED {
+                (first.fast_mul_sub(r, near_shift), last.fast_mul_sub(r, far_shift))
+            } else {
+                (first.mul(r).sub(near_shift), last.mul(r).sub(far_shift))
             };
-            let [first, last] = self.order[k];
-            near = distance(first, self.near_shift[k]).max(near);
-            far = distance(last, self.far_shift[k]).min(far);
+            near = enter.max(near);
+            far = leave.min(far);
         }
         (near.less_or_equal(far), near)
     }

@@ -62,16 +62,14 @@ impl<V: Copy> Sheared<V> {
         let scale = s.splat(ray.scale);
         let raw = s.load(&vertices[kz]).mul(s.splat(ray.scale * shear.depth_sign));
         let depth = raw.sub(s.splat(ray.origin[kz] * shear.depth_sign));
-        let across = |axis: usize, slope: f32| {
-            let from_origin = s.load(&vertices[axis]).mul(scale).sub(s.splat(ray.origin[axis]));
-            from_origin.sub(s.splat(slope).mul(depth))
-        };
-        Sheared { x: across(kx, shear.slope[0]), y: across(ky, shear.slope[1]), raw, depth }
-    }
-
-    #[inline(always)]
-    fn map<const N: usize>(self, f: impl Fn(V) -> V) -> Self {
-        Sheared { x: f(self.x), y: f(self.y), raw: f(self.raw), depth: f(self.depth) }
+        let x = s.load(&vertices[kx]).mul(scale).sub(s.splat(ray.origin[kx]));
+        let y = s.load(&vertices[ky]).mul(scale).sub(s.splat(ray.origin[ky]));
+        Sheared {
+            x: x.sub(s.splat(shear.slope[0]).mul(depth)),
+            y: y.sub(s.splat(shear.slope[1]).mul(depth)),
+            raw,
+            depth,
+        }
     }
 
     /// Twice the area that the ray's point spans with two vertices.
@@ -81,6 +79,30 @@ impl<V: Copy> Sheared<V> {
         V: Lanes<N>,
     {
         self.x.mul(next.y).sub(self.y.mul(next.x))
+    }
+
+    /// The larger distance from the ray along x and y.
+    #[inline(always)]
+    fn size<const N: usize>(&self) -> V
+    where
+        V: Lanes<N>,
+    {
+        self.x.abs().max(self.y.abs())
+    }
+}
+
+/// The corners `k` of all triangles of a block, out of its vertices.
+#[inline(always)]
+fn corners<S: Simd>(
+    s: S,
+    vertices: &Sheared<<S as Width<16>>::V>,
+    list: &[u8; 8],
+) -> Sheared<<S as Width<16>>::V> {
+    Sheared {
+        x: s.corners(vertices.x, list),
+        y: s.corners(vertices.y, list),
+        raw: s.corners(vertices.raw, list),
+        depth: s.corners(vertices.depth, list),
     }
 }
 
@@ -125,8 +147,7 @@ fn sieve<S: Width<N>, const N: usize>(
     let too_near = farthest_depth.add(farthest_depth.abs().mul(slack)).less(low);
     // Each area over the vertex opposite to it.
     let (over_a, over_b, over_c) = (b.area(&c), c.area(&a), a.area(&b));
-    let in_plane = |v: &Sheared<S::V>| v.x.abs().max(v.y.abs());
-    let size = in_plane(&a).max(in_plane(&b)).max(in_plane(&c));
+    let size = a.size().max(b.size()).max(c.size());
     let deepest = nearest_depth.abs().max(farthest_depth.abs());
     // The error of a coordinate, and that of an area.
     let shift = size
@@ -150,16 +171,18 @@ fn sieve<S: Width<N>, const N: usize>(
         .mul(span.mul(s.splat(20.0)))
         .add(a.depth.abs().add(span).mul(size_of_total).mul(s.splat(5.0 * UNIT32)))
         .add(s.splat(TINY));
-    let beyond = |depth: f32| rise.sub(s.splat(depth).sub(a.depth).mul(size_of_total));
     let minus_error = s.splat(0.0).sub(error);
-    let past_high = error.less(beyond(depths.high));
-    let before_low = beyond(depths.low).less(minus_error);
-    let inside_high = beyond(depths.inside[1]).less(minus_error);
-    let inside_low = error.less(beyond(depths.inside[0]));
+    // Positive where the meeting is beyond that depth.
+    let past_high = rise.sub(high.sub(a.depth).mul(size_of_total));
+    let past_low = rise.sub(low.sub(a.depth).mul(size_of_total));
+    let inside_low = rise.sub(s.splat(depths.inside[0]).sub(a.depth).mul(size_of_total));
+    let inside_high = rise.sub(s.splat(depths.inside[1]).sub(a.depth).mul(size_of_total));
+    let past = error.less(past_high) | past_low.less(minus_error);
+    let inside = error.less(inside_low) & inside_high.less(minus_error);
     Sieved {
-        rejected: too_far | too_near | outside | past_high | before_low,
+        rejected: too_far | too_near | outside | past,
         sure,
-        inside: sure & inside_high & inside_low,
+        inside: sure & inside,
         over_b,
         over_c,
         total,
@@ -192,7 +215,8 @@ pub(crate) fn triangles<S: Simd>(
         return few(ray, depths, block, lanes);
     }
     let vertices = Sheared::new(s, ray, &block.vertices);
-    let corners = [0, 1, 2].map(|k| vertices.map::<16>(|v| s.corners(v, &block.corners[k])));
+    let [a, b, c] = &block.corners;
+    let corners = [corners(s, &vertices, a), corners(s, &vertices, b), corners(s, &vertices, c)];
     let Sieved { rejected, sure, inside, .. } = sieve::<S, 16>(s, ray, depths, corners);
     Triangles { candidates: !rejected & 0xFFFF, sure, inside }
 }

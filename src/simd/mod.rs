@@ -58,7 +58,7 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V;
 
     /// Runs `kernel` with the backend's instructions; all that it inlines may use them.
-    fn run<R>(self, kernel: impl FnOnce(Self) -> R) -> R;
+    fn run<K: Kernel>(self, kernel: K) -> K::Output;
 }
 
 /// The vector instructions that queries use.
@@ -115,7 +115,8 @@ impl Backend {
 /// The one global of the library: asking the processor takes longer than a ray.
 static CHOICE: AtomicU8 = AtomicU8::new(0);
 
-/// Something to run with the backend of the moment.
+/// Something to run with a backend. Not a closure: `run`, and all that it calls, must be inlined always,
+/// or it is compiled without the instructions.
 pub(crate) trait Kernel {
     type Output;
     fn run<S: Simd>(self, s: S) -> Self::Output;
@@ -127,13 +128,13 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     match Backend::current() {
         #[cfg(target_arch = "x86_64")]
         // SAFETY: `current` is never above what `detected` found on this processor.
-        Backend::Avx512 => unsafe { x86::Avx512::assume() }.run(|s| kernel.run(s)),
+        Backend::Avx512 => unsafe { x86::Avx512::assume() }.run(kernel),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
-        Backend::Avx2 => unsafe { x86::Avx2::assume() }.run(|s| kernel.run(s)),
+        Backend::Avx2 => unsafe { x86::Avx2::assume() }.run(kernel),
         #[cfg(target_arch = "x86_64")]
-        Backend::Bits128 => x86::Sse2.run(|s| kernel.run(s)),
-        _ => Scalar.run(|s| kernel.run(s)),
+        Backend::Bits128 => x86::Sse2.run(kernel),
+        _ => Scalar.run(kernel),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use super::{Lanes, Simd, Width, corner};
+use super::{Kernel, Lanes, Simd, Width, corner};
 
 /// Portable code, one lane after the other.
 #[derive(Clone, Copy)]
@@ -120,7 +120,7 @@ impl Simd for Scalar {
     }
 
     #[inline(always)]
-    fn run<R>(self, kernel: impl FnOnce(Self) -> R) -> R {
-        kernel(self)
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
     }
 }

@@ -3,7 +3,7 @@
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
-use super::{Backend, Lanes, Simd, Width, corner, scalar};
+use super::{Backend, Kernel, Lanes, Simd, Width, corner, scalar};
 
 /// What this processor and its operating system have. CPUID stops in the hypervisor of a virtual
 /// machine, so the answer is kept by [`Backend::current`].
@@ -456,8 +456,25 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
-    fn run<R>(self, kernel: impl FnOnce(Self) -> R) -> R {
-        kernel(self)
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        kernel.run(self)
+    }
+}
+
+/// Of 16 lanes the eight with these numbers, in the four lowest bits.
+///
+/// # Safety
+///
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn pick(table: Two<F8>, numbers: __m256i) -> F8 {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let below = _mm256_permutevar8x32_ps(table.0.0, numbers);
+        let above = _mm256_permutevar8x32_ps(table.1.0, numbers);
+        // The fourth bit of a number becomes the sign.
+        let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(numbers));
+        F8(_mm256_blendv_ps(below, above, upper))
     }
 }
 
@@ -475,22 +492,15 @@ impl Simd for Avx2 {
             let shifts = _mm256_loadu_si256(SHIFTS.as_ptr().cast());
             let low = _mm256_srlv_epi32(all, shifts);
             let high = _mm256_srlv_epi32(all, _mm256_add_epi32(shifts, _mm256_set1_epi32(16)));
-            let pick = |numbers: __m256i| {
-                let below = _mm256_permutevar8x32_ps(table.0.0, numbers);
-                let above = _mm256_permutevar8x32_ps(table.1.0, numbers);
-                // The fourth bit of a number becomes the sign.
-                let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(numbers));
-                F8(_mm256_blendv_ps(below, above, upper))
-            };
-            Two(pick(low), pick(high))
+            Two(pick(table, low), pick(table, high))
         }
     }
 
     #[inline(always)]
-    fn run<R>(self, kernel: impl FnOnce(Self) -> R) -> R {
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
-        fn with<R>(s: Avx2, kernel: impl FnOnce(Avx2) -> R) -> R {
-            kernel(s)
+        fn with<K: Kernel>(s: Avx2, kernel: K) -> K::Output {
+            kernel.run(s)
         }
         // SAFETY: the token proves AVX2 and FMA; processors with these have the rest, which is
         // checked where the token is made.
@@ -513,12 +523,12 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
-    fn run<R>(self, kernel: impl FnOnce(Self) -> R) -> R {
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(
             enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt"
         )]
-        fn with<R>(s: Avx512, kernel: impl FnOnce(Avx512) -> R) -> R {
-            kernel(s)
+        fn with<K: Kernel>(s: Avx512, kernel: K) -> K::Output {
+            kernel.run(s)
         }
         // SAFETY: the token proves AVX-512; processors with it have the rest, which is checked where
         // the token is made.
