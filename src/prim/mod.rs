@@ -58,7 +58,8 @@ impl Leaves<'_> {
         })
     }
 
-    fn intersect_block<Q: Query>(
+    /// Offers `query` what the ray meets among lanes of one block.
+    pub fn intersect_block<Q: Query>(
         &self,
         kind: u32,
         number: usize,
