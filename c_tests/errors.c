@@ -82,7 +82,7 @@ static void check_builds(void) {
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.refit = 2);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.plain_list = 3);
     REFUSED(RT_ERROR_UNSUPPORTED, options.quality = RT_QUALITY_BEST);
-    REFUSED(RT_ERROR_UNSUPPORTED, options.layout = RT_LAYOUT_WIDE_8);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.layout = 12);
     REFUSED(RT_ERROR_UNSUPPORTED, options.refit = 1);
     REFUSED(RT_ERROR_UNSUPPORTED, options.parallel_for = task_runner);
 

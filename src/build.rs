@@ -2,7 +2,7 @@
 
 use core::mem::MaybeUninit;
 
-use crate::accel::Accel;
+use crate::accel::{Accel, Layout};
 use crate::block::Census;
 use crate::error::{BuildError, Unsupported};
 use crate::prim::{Survey, survey};
@@ -33,18 +33,6 @@ pub enum Quality {
     Best,
 }
 
-/// How the nodes of a BVH lie in memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Layout {
-    /// What suits this machine.
-    #[default]
-    Automatic,
-    /// Binary nodes of 32 bytes: the least memory.
-    Compact,
-    /// Bundles of 4, 8 or 16 records. Not in this version.
-    Wide(u32),
-}
-
 /// Whether a plain list may stand for the structure asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PlainList {
@@ -72,7 +60,7 @@ pub struct BuildOptions {
 
 /// The memory [`build_bvh`] needs for `scene`.
 pub fn bvh_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError> {
-    Ok(Job::new(scene, options, Structure::Bvh)?.memory)
+    Ok(Job::new(scene, options, options.bvh())?.memory)
 }
 
 /// The memory [`build_grid`] needs for `scene`.
@@ -83,14 +71,14 @@ pub fn grid_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, Build
 /// Builds a BVH over `scene` at the front of `memory`.
 ///
 /// `memory` starts at a multiple of 64 bytes and holds at least the minimum of [`bvh_needs`]; with
-/// less than its size the leaves are larger. The finished block is [`Accel::block`]; what lies behind
+/// less than its size the leaves are larger, and in the last resort the layout is compact. The finished block is [`Accel::block`]; what lies behind
 /// it is free again. On an error nothing was written.
 pub fn build_bvh<'m>(
     scene: &Scene,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, Structure::Bvh)?.run(memory)
+    Job::new(scene, options, options.bvh())?.run(memory)
 }
 
 /// Builds a regular grid over `scene` at the front of `memory`.
@@ -112,6 +100,8 @@ enum Structure {
     List,
     Grid,
     Bvh,
+    /// A BVH of bundles with this many lanes.
+    Wide(u32),
 }
 
 /// A build that was checked and sized, but not begun.
@@ -142,6 +132,7 @@ impl<'s, 'a> Job<'s, 'a> {
             Structure::List => list::needs(&survey, &census)?,
             Structure::Grid => grid::needs(scene, &survey, &census)?,
             Structure::Bvh => bvh::needs(&survey, &census)?,
+            Structure::Wide(width) => bvh::needs_wide(&survey, &census, width)?,
         };
         let memory = Memory { size, minimum, alignment: ALIGNMENT };
         Ok(Job { scene, survey, census, structure, memory })
@@ -157,12 +148,13 @@ impl<'s, 'a> Job<'s, 'a> {
         }
         let usable = memory.len().min(size);
         let bytes = storage::zeroed(&mut memory[..usable]);
-        let build = match self.structure {
-            Structure::List => list::build,
-            Structure::Grid => grid::build,
-            Structure::Bvh => bvh::build,
+        let Job { scene, survey, census, .. } = self;
+        match self.structure {
+            Structure::List => list::build(scene, survey, census, bytes)?,
+            Structure::Grid => grid::build(scene, survey, census, bytes)?,
+            Structure::Bvh => bvh::build(scene, survey, census, bytes)?,
+            Structure::Wide(width) => bvh::build_wide(scene, survey, census, width, bytes)?,
         };
-        build(self.scene, &self.survey, &self.census, bytes)?;
         // A block that was just sealed is always recognised, so this error does not arise.
         Accel::recognise(bytes).map_err(|_| BuildError::OutOfMemory { minimum })
     }
@@ -170,15 +162,25 @@ impl<'s, 'a> Job<'s, 'a> {
 
 impl BuildOptions {
     fn check(&self) -> Result<(), BuildError> {
-        let unsupported = if self.quality != Quality::Balanced {
-            Unsupported::Quality
-        } else if matches!(self.layout, Layout::Wide(_)) {
-            Unsupported::Layout
-        } else if self.refit {
-            Unsupported::Refit
-        } else {
-            return Ok(());
-        };
-        Err(BuildError::Unsupported(unsupported))
+        match self.layout {
+            Layout::Automatic | Layout::Compact | Layout::Wide(4 | 8 | 16) => {}
+            Layout::Wide(width) => return Err(BuildError::NoSuchLayout { width }),
+        }
+        if self.quality != Quality::Balanced {
+            return Err(BuildError::Unsupported(Unsupported::Quality));
+        }
+        if self.refit {
+            return Err(BuildError::Unsupported(Unsupported::Refit));
+        }
+        Ok(())
+    }
+
+    /// The structure of a BVH with this layout.
+    fn bvh(&self) -> Structure {
+        match self.layout {
+            Layout::Automatic => Structure::Wide(16),
+            Layout::Compact => Structure::Bvh,
+            Layout::Wide(width) => Structure::Wide(width),
+        }
     }
 }

@@ -28,6 +28,11 @@ pub enum BuildError {
     /// The scene has more primitives than 32 bits can number, or asks for more memory than the
     /// machine can address.
     TooLarge,
+    /// Bundles are 4, 8 or 16 wide.
+    NoSuchLayout {
+        /// The width asked for.
+        width: u32,
+    },
     /// The option is part of the interface but not of this version.
     Unsupported(Unsupported),
 }
@@ -38,8 +43,6 @@ pub enum BuildError {
 pub enum Unsupported {
     /// A quality other than balanced.
     Quality,
-    /// A layout other than compact.
-    Layout,
     /// Refitting.
     Refit,
 }
@@ -78,6 +81,9 @@ impl fmt::Display for BuildError {
             }
             BuildError::Misaligned => f.write_str("the memory is not aligned to 64 bytes"),
             BuildError::TooLarge => f.write_str("the scene is too large to be numbered or stored"),
+            BuildError::NoSuchLayout { width } => {
+                write!(f, "there are no bundles of {width} lanes: 4, 8 or 16")
+            }
             BuildError::Unsupported(what) => write!(f, "this version cannot build it: {what}"),
         }
     }
@@ -87,7 +93,6 @@ impl fmt::Display for Unsupported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Unsupported::Quality => "only the balanced quality exists so far",
-            Unsupported::Layout => "only the compact layout exists so far",
             Unsupported::Refit => "blocks cannot be refitted yet",
         })
     }

@@ -74,9 +74,9 @@ mod simd;
 mod storage;
 mod surface;
 
-pub use accel::{Accel, Info, Kind};
+pub use accel::{Accel, Info, Kind, Layout};
 pub use build::{
-    BuildOptions, Layout, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
+    BuildOptions, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
 };
 pub use error::{BuildError, OpenError, Unsupported};
 #[cfg(feature = "alloc")]

@@ -1,7 +1,7 @@
 //! A plain list of leaf blocks: what a handful of primitives needs.
 
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
-use crate::block::{Census, Counts, KIND_LIST, PartsMut};
+use crate::block::{Census, Counts, KIND_LIST, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
 use crate::prim::{Packer, Shape, Survey, for_each_prim, geometries};
 use crate::scene::Scene;
@@ -37,7 +37,7 @@ pub(crate) fn build(
     let short = BuildError::OutOfMemory { minimum };
     let parts = counts.parts_mut(bytes).ok_or(short)?;
     counts.triangle_blocks = pack(scene, census, parts) as u32;
-    counts.seal(KIND_LIST, census, bytes).ok_or(short)
+    counts.seal(KIND_LIST, LAYOUT_COMPACT, census, bytes).ok_or(short)
 }
 
 /// Packs the primitives in the order of their numbers; returns the number of triangle blocks.

@@ -28,6 +28,8 @@ pub(crate) unsafe trait Plain: Copy + 'static {}
 
 // SAFETY: every bit pattern is a number, and a primitive has no padding.
 unsafe impl Plain for u32 {}
+// SAFETY: as above.
+unsafe impl Plain for u64 {}
 // SAFETY: an array adds no padding to its elements.
 unsafe impl Plain for [f32; 3] {}
 

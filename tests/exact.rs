@@ -11,10 +11,10 @@ use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
 use raykern_harness::rays::{Family, RayMaker};
 
-/// Judges `count` rays of a family in the BVH; `agree.rs` answers for the others.
+/// Judges `count` rays of a family in the widest BVH; `agree.rs` answers for the others.
 fn tally(model: &Model, family: Family, count: usize, seed: u64) -> Tally {
     let (all, oracle) = (All::of(model), Oracle::new(model));
-    let (_, accel) = all.accels()[2];
+    let (_, accel) = all.accels()[5];
     let options = QueryOptions::default();
     let mut tally = Tally::default();
     let mut shown = 0;

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{bits, odd_models};
-use raykern::{Accel, BuildError, BuildOptions, Memory, OpenError, PlainList, Scene};
+use raykern::{Accel, BuildError, BuildOptions, Layout, Memory, OpenError, PlainList, Scene};
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
@@ -15,17 +15,57 @@ type Needs = fn(&Scene, &BuildOptions) -> Result<Memory, BuildError>;
 type Build =
     for<'m> fn(&Scene, &BuildOptions, &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError>;
 
-const STRUCTURES: [(&str, Needs, Build); 2] = [
-    ("grid", raykern::grid_needs, raykern::build_grid),
-    ("bvh", raykern::bvh_needs, raykern::build_bvh),
+/// A structure to build, forced.
+#[derive(Clone, Copy)]
+struct Structure {
+    name: &'static str,
+    needs: Needs,
+    build: Build,
+    layout: Layout,
+}
+
+const STRUCTURES: [Structure; 5] = [
+    Structure {
+        name: "grid",
+        needs: raykern::grid_needs,
+        build: raykern::build_grid,
+        layout: Layout::Automatic,
+    },
+    bvh("compact", Layout::Compact),
+    bvh("wide 4", Layout::Wide(4)),
+    bvh("wide 8", Layout::Wide(8)),
+    bvh("wide 16", Layout::Wide(16)),
 ];
 
-const FORCED: BuildOptions = BuildOptions {
-    quality: raykern::Quality::Balanced,
-    layout: raykern::Layout::Automatic,
-    refit: false,
-    plain_list: PlainList::Never,
-};
+const fn bvh(name: &'static str, layout: Layout) -> Structure {
+    Structure { name, needs: raykern::bvh_needs, build: raykern::build_bvh, layout }
+}
+
+impl Structure {
+    fn options(&self) -> BuildOptions {
+        let (layout, plain_list) = (self.layout, PlainList::Never);
+        BuildOptions { layout, plain_list, ..BuildOptions::default() }
+    }
+
+    fn needs(&self, scene: &Scene) -> Memory {
+        (self.needs)(scene, &self.options()).expect("a size")
+    }
+
+    fn build<'m>(
+        &self,
+        scene: &Scene,
+        memory: &'m mut [MaybeUninit<u8>],
+    ) -> Result<Accel<'m>, BuildError> {
+        (self.build)(scene, &self.options(), memory)
+    }
+
+    fn block(&self, model: &Model) -> Vec<u8> {
+        model.with_scene(|scene| {
+            let size = self.needs(scene).size;
+            with_memory(size, 0, |m| self.build(scene, m).expect("enough").block().to_vec())
+        })
+    }
+}
 
 /// `size` bytes from a multiple of 64 plus `shift`, filled with a pattern.
 fn with_memory<R>(size: usize, shift: usize, f: impl FnOnce(&mut [MaybeUninit<u8>]) -> R) -> R {
@@ -47,23 +87,17 @@ fn models() -> Vec<(&'static str, Model)> {
     odd_models().into_iter().chain(made).collect()
 }
 
-fn block(model: &Model, needs: Needs, build: Build) -> Vec<u8> {
-    model.with_scene(|scene| {
-        let size = needs(scene, &FORCED).expect("a size").size;
-        with_memory(size, 0, |m| build(scene, &FORCED, m).expect("enough").block().to_vec())
-    })
-}
-
 #[test]
 fn what_is_needed_is_enough_and_less_than_the_minimum_is_refused() {
     for (name, model) in models() {
-        for (structure, needs, build) in STRUCTURES {
+        for structure in STRUCTURES {
+            let Structure { name: kind, .. } = structure;
             model.with_scene(|scene| {
-                let Memory { size, minimum, alignment } = needs(scene, &FORCED).expect("a size");
-                assert!(minimum <= size && alignment == 64, "{name} {structure}");
+                let Memory { size, minimum, alignment } = structure.needs(scene);
+                assert!(minimum <= size && alignment == 64, "{name} {kind}");
                 for enough in [size, minimum] {
-                    let built = with_memory(enough, 0, |m| build(scene, &FORCED, m).map(|_| ()));
-                    assert_eq!(built, Ok(()), "{name} {structure} {enough}");
+                    let built = with_memory(enough, 0, |m| structure.build(scene, m).map(|_| ()));
+                    assert_eq!(built, Ok(()), "{name} {kind} {enough}");
                 }
                 let untouched = |m: &[MaybeUninit<u8>]| {
                     // SAFETY: `with_memory` has written every byte.
@@ -71,14 +105,14 @@ fn what_is_needed_is_enough_and_less_than_the_minimum_is_refused() {
                     m.iter().all(|b| unsafe { b.assume_init() } == 0xa5)
                 };
                 with_memory(minimum - 1, 0, |m| {
-                    let built = build(scene, &FORCED, m).map(|_| ());
+                    let built = structure.build(scene, m).map(|_| ());
                     assert_eq!(built, Err(BuildError::OutOfMemory { minimum }), "{name}");
-                    assert!(untouched(m), "{name} {structure}");
+                    assert!(untouched(m), "{name} {kind}");
                 });
                 with_memory(size, 4, |m| {
-                    let built = build(scene, &FORCED, m).map(|_| ());
+                    let built = structure.build(scene, m).map(|_| ());
                     assert_eq!(built, Err(BuildError::Misaligned), "{name}");
-                    assert!(untouched(m), "{name} {structure}");
+                    assert!(untouched(m), "{name} {kind}");
                 });
             });
         }
@@ -88,9 +122,9 @@ fn what_is_needed_is_enough_and_less_than_the_minimum_is_refused() {
 #[test]
 fn equal_builds_give_equal_bytes_and_a_copy_gives_equal_answers() {
     for (name, model) in models() {
-        for (structure, needs, build) in STRUCTURES {
-            let first = block(&model, needs, build);
-            assert_eq!(first, block(&model, needs, build), "{name} {structure}");
+        for structure in STRUCTURES {
+            let first = structure.block(&model);
+            assert_eq!(first, structure.block(&model), "{name} {}", structure.name);
             with_copy(&first, |a| {
                 with_copy(&first, |b| {
                     let (a, b) = (Accel::open(a).expect("sound"), Accel::open(b).expect("sound"));
@@ -109,8 +143,8 @@ fn broken_blocks_are_refused_or_harmless() {
     let (mut refused, mut opened) = (0, 0);
     for (name, model) in models() {
         let rays = RayMaker::new(&model, 1).many(Family::Random, 20);
-        for (_, needs, build) in STRUCTURES {
-            let good = block(&model, needs, build);
+        for structure in STRUCTURES {
+            let good = structure.block(&model);
             for cut in [0, 1, 63, 64, good.len() / 2, good.len() - 1] {
                 with_copy(&good[..cut.min(good.len() - 1)], |m| {
                     assert!(Accel::open(m).is_err(), "{name} cut to {cut}");

@@ -23,6 +23,10 @@ pub(crate) struct Bundle<const W: usize> {
 const _: () = assert!(size_of::<Bundle<4>>() == 112 && size_of::<Bundle<8>>() == 224);
 const _: () = assert!(size_of::<Bundle<16>>() == 448);
 
+/// Bytes of a bundle for each of its lanes.
+pub(crate) const LANE: usize = 28;
+const _: () = assert!(size_of::<Bundle<4>>() == 4 * LANE && size_of::<Bundle<16>>() == 16 * LANE);
+
 // SAFETY: numbers only; 28 W is a multiple of 16 for W = 4, 8 and 16, so no padding.
 unsafe impl Plain for Bundle<4> {}
 // SAFETY: as above.

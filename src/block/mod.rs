@@ -1,7 +1,8 @@
 //! The block: what a build leaves in the caller's memory.
 //!
 //! ```text
-//! | header | geometries | prim_ids | grids | nodes | words | sphere blocks | triangle blocks | runs |
+//! | header | geometries | prim_ids | grids | nodes | bundles | words |
+//! | sphere blocks | triangle blocks | runs |
 //! ```
 //!
 //! Every part starts at a multiple of 64 bytes and is empty in blocks that have no use for it. There
@@ -17,6 +18,7 @@ mod node;
 pub(crate) use leaf::Geometry;
 pub(crate) use node::BvhNode;
 
+use bundle::{Bundle, LANE};
 use cells::{GridHead, Run};
 use leaf::{SphereBlock, TriangleBlock};
 
@@ -32,7 +34,8 @@ const VERSION: u32 = 2;
 pub(crate) const KIND_LIST: u32 = 1;
 pub(crate) const KIND_GRID: u32 = 2;
 pub(crate) const KIND_BVH: u32 = 3;
-/// The only layout so far: binary nodes of 32 bytes, or a grid's words.
+/// Binary nodes of 32 bytes, or no nodes at all. Other layouts are the width of their bundles: 4, 8
+/// or 16.
 pub(crate) const LAYOUT_COMPACT: u32 = 1;
 
 /// The number of elements in each part.
@@ -47,6 +50,8 @@ pub(crate) struct Counts {
     pub sphere_blocks: u32,
     pub triangle_blocks: u32,
     pub runs: u32,
+    /// Lanes of bundles: their number times their width.
+    pub bundle_lanes: u32,
 }
 
 /// The first 128 bytes.
@@ -56,7 +61,7 @@ pub(crate) struct Counts {
 ///      | magic | byte order | version | size | kind | layout | bounds | ...
 /// byte 56           60                64          68
 ///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reach | reserved |
-/// byte 88       120        128
+/// byte 88       124        128
 ///      | counts | reserved |
 /// ```
 ///
@@ -82,11 +87,11 @@ pub(crate) struct Header {
     pub reach: f32,
     reserved: u32,
     pub counts: Counts,
-    reserved_too: [u32; 2],
+    reserved_too: u32,
 }
 const _: () = assert!(size_of::<Header>() == 128);
 
-// SAFETY: numbers only; 8 + 4 + 4 + 8 + 4 + 4 + 24 + 24 + 8 + 32 + 8 = 128, so no padding.
+// SAFETY: numbers only; 8 + 4 + 4 + 8 + 4 + 4 + 24 + 24 + 8 + 36 + 4 = 128, so no padding.
 #[allow(unsafe_code, reason = "a promise about the layout drawn above")]
 unsafe impl Plain for Header {}
 
@@ -97,6 +102,7 @@ pub(crate) struct Offsets {
     pub prim_ids: usize,
     pub grids: usize,
     pub nodes: usize,
+    pub bundles: usize,
     pub words: usize,
     pub sphere_blocks: usize,
     pub triangle_blocks: usize,
@@ -120,6 +126,7 @@ impl Counts {
             prim_ids: part(self.prim_ids, size_of::<u32>())?,
             grids: part(self.grids, size_of::<GridHead>())?,
             nodes: part(self.nodes, size_of::<BvhNode>())?,
+            bundles: part(self.bundle_lanes, LANE)?,
             words: part(self.words, size_of::<u32>())?,
             sphere_blocks: part(self.sphere_blocks, size_of::<SphereBlock>())?,
             triangle_blocks: part(self.triangle_blocks, size_of::<TriangleBlock>())?,
@@ -136,6 +143,8 @@ pub(crate) struct PartsMut<'b> {
     pub prim_ids: &'b mut [u32],
     pub grids: &'b mut [GridHead],
     pub nodes: &'b mut [BvhNode],
+    /// Room for the bundles, as bytes.
+    pub bundles: &'b mut [u8],
     pub words: &'b mut [u32],
     pub sphere_blocks: &'b mut [SphereBlock],
     pub triangle_blocks: &'b mut [TriangleBlock],
@@ -152,7 +161,8 @@ impl Counts {
         let (geometries, rest) = part(rest, self.geometries, at.prim_ids - at.geometries)?;
         let (prim_ids, rest) = part(rest, self.prim_ids, at.grids - at.prim_ids)?;
         let (grids, rest) = part(rest, self.grids, at.nodes - at.grids)?;
-        let (nodes, rest) = part(rest, self.nodes, at.words - at.nodes)?;
+        let (nodes, rest) = part(rest, self.nodes, at.bundles - at.nodes)?;
+        let (bundles, rest) = rest.split_at_mut_checked(at.words - at.bundles)?;
         let (words, rest) = part(rest, self.words, at.sphere_blocks - at.words)?;
         let spheres = at.triangle_blocks - at.sphere_blocks;
         let (sphere_blocks, rest) = part(rest, self.sphere_blocks, spheres)?;
@@ -164,6 +174,7 @@ impl Counts {
             prim_ids,
             grids,
             nodes,
+            bundles,
             words,
             sphere_blocks,
             triangle_blocks,
@@ -174,13 +185,14 @@ impl Counts {
 
     /// Finishes a block whose parts are in place: zeros between them, and the header. Returns its
     /// size.
-    pub fn seal(&self, kind: u32, census: &Census, bytes: &mut [u8]) -> Option<usize> {
+    pub fn seal(&self, kind: u32, layout: u32, census: &Census, bytes: &mut [u8]) -> Option<usize> {
         let at = self.offsets()?;
         let parts = [
             (at.geometries, self.geometries as usize * size_of::<Geometry>()),
             (at.prim_ids, self.prim_ids as usize * size_of::<u32>()),
             (at.grids, self.grids as usize * size_of::<GridHead>()),
             (at.nodes, self.nodes as usize * size_of::<BvhNode>()),
+            (at.bundles, self.bundle_lanes as usize * LANE),
             (at.words, self.words as usize * size_of::<u32>()),
             (at.sphere_blocks, self.sphere_blocks as usize * size_of::<SphereBlock>()),
             (at.triangle_blocks, self.triangle_blocks as usize * size_of::<TriangleBlock>()),
@@ -191,7 +203,7 @@ impl Counts {
             let next = storage::align_up(end as u64)? as usize;
             bytes.get_mut(end..next)?.fill(0);
         }
-        let header = Header::new(kind, census, *self, at.end);
+        let header = Header::new(kind, layout, census, *self, at.end);
         bytes.get_mut(..size_of::<Header>())?.copy_from_slice(storage::bytes_of(&header));
         Some(at.end)
     }
@@ -217,14 +229,14 @@ pub(crate) struct Census {
 
 impl Header {
     /// The header of a finished block.
-    pub fn new(kind: u32, census: &Census, counts: Counts, size: usize) -> Header {
+    pub fn new(kind: u32, layout: u32, census: &Census, counts: Counts, size: usize) -> Header {
         Header {
             magic: MAGIC,
             byte_order: BYTE_ORDER,
             version: VERSION,
             size: size as u64,
             kind,
-            layout: LAYOUT_COMPACT,
+            layout,
             bounds: census.bounds,
             mesh_count: census.mesh_count,
             triangle_limit: census.triangle_limit,
@@ -235,7 +247,7 @@ impl Header {
             reach: census.bounds.reach(),
             reserved: 0,
             counts,
-            reserved_too: [0; 2],
+            reserved_too: 0,
         }
     }
 }
@@ -249,10 +261,48 @@ pub(crate) struct Block<'m> {
     pub prim_ids: &'m [u32],
     pub grids: &'m [GridHead],
     pub nodes: &'m [BvhNode],
+    pub bundles: Bundles<'m>,
     pub words: &'m [u32],
     pub sphere_blocks: &'m [SphereBlock],
     pub triangle_blocks: &'m [TriangleBlock],
     pub runs: &'m [Run],
+}
+
+/// The bundles of a block, if its layout has them.
+#[derive(Clone, Copy)]
+pub(crate) enum Bundles<'m> {
+    None,
+    Four(&'m [Bundle<4>]),
+    Eight(&'m [Bundle<8>]),
+    Sixteen(&'m [Bundle<16>]),
+}
+
+impl Bundles<'_> {
+    /// Their size in bytes.
+    pub fn size(&self) -> usize {
+        match self {
+            Bundles::None => 0,
+            Bundles::Four(bundles) => size_of_val(*bundles),
+            Bundles::Eight(bundles) => size_of_val(*bundles),
+            Bundles::Sixteen(bundles) => size_of_val(*bundles),
+        }
+    }
+}
+
+impl<'m> Bundles<'m> {
+    /// `lanes` lanes of bundles of this layout at `offset`; they fill their last bundle.
+    fn view(bytes: &'m [u8], offset: usize, layout: u32, lanes: u32) -> Option<Self> {
+        if lanes.checked_rem(layout)? != 0 {
+            return None;
+        }
+        let count = (lanes / layout) as usize;
+        Some(match layout {
+            4 => Bundles::Four(storage::view(bytes, offset, count)?),
+            8 => Bundles::Eight(storage::view(bytes, offset, count)?),
+            16 => Bundles::Sixteen(storage::view(bytes, offset, count)?),
+            _ => (lanes == 0).then_some(Bundles::None)?,
+        })
+    }
 }
 
 impl<'m> Block<'m> {
@@ -294,7 +344,7 @@ impl<'m> Block<'m> {
         if header.version != VERSION {
             return Err(OpenError::Version);
         }
-        if header.layout != LAYOUT_COMPACT {
+        if !matches!(header.layout, LAYOUT_COMPACT | 4 | 8 | 16) {
             return Err(OpenError::Layout);
         }
         let offsets = header.counts.offsets().ok_or(OpenError::Corrupt)?;
@@ -315,6 +365,7 @@ impl<'m> Block<'m> {
             prim_ids: view_u32(at.prim_ids, counts.prim_ids)?,
             grids: storage::view(bytes, at.grids, counts.grids as usize)?,
             nodes: storage::view(bytes, at.nodes, counts.nodes as usize)?,
+            bundles: Bundles::view(bytes, at.bundles, header.layout, counts.bundle_lanes)?,
             words: view_u32(at.words, counts.words)?,
             sphere_blocks: storage::view(bytes, at.sphere_blocks, counts.sphere_blocks as usize)?,
             triangle_blocks: storage::view(
@@ -351,6 +402,7 @@ mod tests {
             sphere_blocks: most,
             triangle_blocks: most,
             runs: most,
+            bundle_lanes: most,
         };
         // Two terabytes: addressable with 64 bits, refused with 32.
         assert_eq!(counts.offsets().is_some(), usize::BITS == 64);

@@ -1,23 +1,26 @@
-//! A bounding volume hierarchy: a binary tree of 32-byte nodes over the leaf blocks.
+//! A bounding volume hierarchy over the leaf blocks, in two forms: a binary tree of 32-byte nodes, or a
+//! tree of bundles.
 
-mod build;
+mod collapse;
+mod compact;
+mod emit;
+mod fits;
 mod stack;
 mod traverse;
 mod tree;
 mod validate;
 mod wide;
+mod wide_build;
 
-pub(crate) use build::{build, needs};
+pub(crate) use compact::{build, needs};
 pub(crate) use traverse::traverse;
-pub(crate) use validate::tree_is_sound;
+pub(crate) use validate::{bundles_are_sound, tree_is_sound};
 pub(crate) use wide::traverse_wide;
+pub(crate) use wide_build::{build_wide, needs_wide};
 
 /// No path from the root is longer, whatever the scene, so a stack of this many entries suffices.
 ///
 /// SAH splits are allowed as long as the rest could still be halved down to leaves within this
-/// depth; `2^30` primitives halve 28 times to leaves of six, and one level parts kinds.
+/// depth; `2^30` primitives halve 28 times to leaves of five, and one level parts kinds. A bundle
+/// takes the place of one binary node at least, so a tree of bundles is no deeper.
 const MAX_DEPTH: usize = 64;
-
-/// Primitives of a leaf at most. Six triangles never need more than the rest of one block and a
-/// second one.
-const LEAF_MAX: usize = 6;

@@ -4,9 +4,11 @@
 
 use glam::DVec3;
 
-use super::{LEAF_MAX, MAX_DEPTH};
+use super::MAX_DEPTH;
 use crate::block::BvhNode;
 use crate::math::Aabb;
+use crate::prim::{Shape, for_each_prim};
+use crate::scene::Scene;
 use crate::storage::Plain;
 
 /// A primitive as the builder sees it.
@@ -39,19 +41,67 @@ impl PrimRef {
     }
 }
 
-/// A leaf that has no lanes yet: `lanes` holds the number of its refs, and their kind in bit 8.
+/// Writes a ref for each primitive that can be hit.
+pub(crate) fn gather(scene: &Scene, refs: &mut [PrimRef]) {
+    let mut free = refs.iter_mut();
+    for_each_prim(scene, |prim| {
+        if let Some(r) = free.next() {
+            let sphere = matches!(prim.shape, Shape::Sphere { .. });
+            *r = PrimRef::new(prim.id, &prim.shape.aabb(), sphere);
+        }
+    });
+}
+
+/// A leaf that has no lanes yet: `first` is its first ref; `lanes` holds the number of its refs, and
+/// their kind in bit 8.
 pub(crate) struct Grown;
 
 impl Grown {
-    fn leaf(bounds: &Aabb, refs: &[PrimRef]) -> BvhNode {
+    fn leaf(bounds: &Aabb, first: usize, refs: &[PrimRef]) -> BvhNode {
         let sphere = refs.first().map_or(0, |r| r.sphere);
-        BvhNode { lanes: refs.len() as u32 | sphere << 8, ..BvhNode::inner(bounds, 0) }
+        BvhNode { lanes: refs.len() as u32 | sphere << 8, ..BvhNode::inner(bounds, first as u32) }
     }
 
     /// The number of refs, and whether they are spheres.
     pub fn of(node: &BvhNode) -> (usize, bool) {
         ((node.lanes & 0xFF) as usize, node.lanes >> 8 != 0)
     }
+}
+
+/// Areas of boxes as `f32`, in units in which a scene's coordinates are about 1 at most: they
+/// neither overflow nor, unless a box is 1e-19 of the scene, underflow.
+#[derive(Clone, Copy)]
+pub(crate) struct Areas(f32);
+
+impl Areas {
+    pub fn new(bounds: &Aabb) -> Self {
+        // 2 to the minus exponent, as far as that is a normal number.
+        let exponent = bounds.reach().to_bits() >> 23;
+        Areas(f32::from_bits(254u32.saturating_sub(exponent).max(1) << 23))
+    }
+
+    /// Half the surface area. Finite, and not NaN, for infinite boxes too.
+    pub fn of(self, aabb: &Aabb) -> f32 {
+        let edge = |k: usize| {
+            let edge = aabb.upper[k] * self.0 - aabb.lower[k] * self.0;
+            if edge < 16.0 { if edge > 0.0 { edge } else { 0.0 } } else { 16.0 }
+        };
+        let [x, y, z] = [edge(0), edge(1), edge(2)];
+        x * y + y * z + z * x
+    }
+}
+
+/// What a tree may be.
+#[derive(Clone, Copy)]
+pub(crate) struct Limits {
+    /// Leaves at most.
+    pub leaves: usize,
+    /// Primitives of a leaf at most; 5 or 6.
+    pub leaf_max: usize,
+    /// Whether there are triangles and spheres: a leaf is of one kind.
+    pub mixed: bool,
+    /// Whether to split as long as the leaves last, and not as long as it pays.
+    pub deep: bool,
 }
 
 /// Cost of a step to two children, in tests of one primitive.
@@ -81,8 +131,8 @@ struct Split {
 /// The fewest leaves that `count` primitives can always be brought into by halving, and by parting
 /// kinds at the end when both occur.
 ///
-/// By induction: what is at most [`LEAF_MAX`] is one leaf, or two of different kinds; what is more
-/// has halves of at least three, and `count / 3` is superadditive.
+/// By induction: what is at most a leaf is one leaf, or two of different kinds; what is more, six at
+/// least, has halves of at least three, and `count / 3` is superadditive.
 fn fewest_leaves(count: usize, mixed: bool) -> usize {
     match (count, mixed) {
         (0 | 1, _) => count,
@@ -100,8 +150,8 @@ pub(crate) fn leaf_budget(count: usize, mixed: bool, full: bool) -> usize {
 }
 
 /// Levels below a node of `count` primitives that is halved down to leaves.
-fn levels_to_halve(count: usize) -> usize {
-    let leaves = count.div_ceil(LEAF_MAX).next_power_of_two();
+fn levels_to_halve(count: usize, leaf_max: usize) -> usize {
+    let leaves = count.div_ceil(leaf_max).next_power_of_two();
     // One more level, to part kinds.
     leaves.trailing_zeros() as usize + 1
 }
@@ -113,12 +163,8 @@ fn levels_to_halve(count: usize) -> usize {
 /// [`Grown`] until they are packed. `nodes` has two entries for each leaf of `budget`.
 ///
 /// Source: \[Wald07\], with leaves limited in number as the memory is.
-pub(crate) fn grow(
-    nodes: &mut [BvhNode],
-    refs: &mut [PrimRef],
-    budget: usize,
-    mixed: bool,
-) -> Option<usize> {
+pub(crate) fn grow(nodes: &mut [BvhNode], refs: &mut [PrimRef], limits: &Limits) -> Option<usize> {
+    let budget = limits.leaves;
     let bounds = bounds_of(refs);
     let mut stack =
         [Task { node: 0, first: 0, count: refs.len(), depth: 0, budget, bounds }; MAX_DEPTH];
@@ -129,8 +175,8 @@ pub(crate) fn grow(
         let task = stack[pending];
         let range = refs.get_mut(task.first..task.first + task.count)?;
         let node = nodes.get_mut(task.node as usize)?;
-        let Some(split) = part(range, &task, mixed) else {
-            *node = Grown::leaf(&task.bounds, range);
+        let Some(split) = part(range, &task, limits) else {
+            *node = Grown::leaf(&task.bounds, task.first, range);
             continue;
         };
         *node = BvhNode::inner(&task.bounds, used);
@@ -173,11 +219,12 @@ fn share(task: &Task, split: &Split) -> usize {
 }
 
 /// Parts the refs of a node in two, or decides for a leaf.
-fn part(refs: &mut [PrimRef], task: &Task, mixed: bool) -> Option<Split> {
+fn part(refs: &mut [PrimRef], task: &Task, limits: &Limits) -> Option<Split> {
+    let Limits { leaf_max, mixed, deep, .. } = *limits;
     let count = refs.len();
     let spheres = if mixed { refs.iter().filter(|r| r.sphere != 0).count() } else { 0 };
     let one_kind = !mixed || spheres == 0 || spheres == count;
-    let may_be_leaf = count <= LEAF_MAX && one_kind;
+    let may_be_leaf = count <= leaf_max && one_kind;
     if may_be_leaf && (count == 1 || task.budget < 2) {
         return None;
     }
@@ -186,18 +233,18 @@ fn part(refs: &mut [PrimRef], task: &Task, mixed: bool) -> Option<Split> {
     };
     let sah = binned(refs, task).filter(|plane| {
         let [left, right] = least(plane.left_count);
-        let levels = levels_to_halve(plane.left_count.max(count - plane.left_count));
+        let levels = levels_to_halve(plane.left_count.max(count - plane.left_count), leaf_max);
         left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
     });
     match sah {
-        Some(plane) if !may_be_leaf || plane.cost < count as f64 => {
+        Some(plane) if !may_be_leaf || deep || plane.cost < count as f64 => {
             let left_count = partition(refs, |r| plane.is_left(r));
             let least = least(left_count);
             Some(Split { left_count, least, left: plane.left, right: plane.right })
         }
         _ if may_be_leaf => None,
         // Few, but of two kinds: each kind can be one leaf.
-        _ if count <= LEAF_MAX => {
+        _ if count <= leaf_max => {
             let left_count = partition(refs, |r| r.sphere == 0);
             Some(split_at(refs, left_count, [1, 1]))
         }
@@ -350,7 +397,7 @@ mod tests {
                 let half = count / 2;
                 let halves = fewest_leaves(half, mixed) + fewest_leaves(count - half, mixed);
                 let done = if mixed { 2 } else { 1 };
-                let least = if count <= LEAF_MAX { done } else { halves };
+                let least = if count < 6 { done } else { halves };
                 assert!(least <= fewest_leaves(count, mixed), "{count} {mixed}");
             }
         }
@@ -358,8 +405,8 @@ mod tests {
 
     #[test]
     fn the_most_primitives_fit_the_depth() {
-        assert!(levels_to_halve(1 << 30) < MAX_DEPTH - 32);
-        assert_eq!(levels_to_halve(LEAF_MAX), 1);
-        assert_eq!(levels_to_halve(LEAF_MAX + 1), 2);
+        assert!(levels_to_halve(1 << 30, 5) < MAX_DEPTH - 32);
+        assert_eq!((levels_to_halve(5, 5), levels_to_halve(6, 5)), (1, 2));
+        assert_eq!((levels_to_halve(6, 6), levels_to_halve(7, 6)), (1, 2));
     }
 }

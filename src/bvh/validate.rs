@@ -2,6 +2,8 @@
 
 use super::MAX_DEPTH;
 use crate::block::BvhNode;
+use crate::block::bundle::{Bundle, ChildRef};
+use crate::block::leaf::KIND_SPHERES;
 use crate::prim::Leaves;
 
 /// Whether the nodes form one tree, no deeper than a traversal's stack, whose leaves exist.
@@ -40,6 +42,79 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
             at = node.first;
             next_pair += 2;
         }
+    }
+}
+
+/// Whether the bundles form one tree, no deeper than a traversal's stack, over just the leaf blocks
+/// that there are.
+///
+/// A depth-first walk that takes lanes in order meets a bundle: its inner children have the next
+/// numbers of bundles, its leaves the next numbers of blocks of their kind. So the walk is repeated
+/// with a counter for each, as in [`tree_is_sound`].
+pub(crate) fn bundles_are_sound<const W: usize>(bundles: &[Bundle<W>], leaves: &Leaves) -> bool {
+    // For each level the next bundle to meet, and the end of its siblings.
+    let mut stack = [(0, 0); MAX_DEPTH];
+    stack[0] = (0, 1);
+    let mut level = 0;
+    let mut next = Next { bundle: 1, triangle_block: 0, sphere_block: 0 };
+    loop {
+        let (at, end) = &mut stack[level];
+        if *at == *end {
+            if level == 0 {
+                break;
+            }
+            level -= 1;
+            continue;
+        }
+        let Some(bundle) = bundles.get(*at) else { return false };
+        *at += 1;
+        let first = next.bundle;
+        if !next.passes(bundle) {
+            return false;
+        }
+        if next.bundle > first {
+            level += 1;
+            let Some(children) = stack.get_mut(level) else { return false };
+            *children = (first, next.bundle);
+        }
+    }
+    next.bundle == bundles.len()
+        && next.triangle_block == leaves.triangle_blocks.len()
+        && next.sphere_block == leaves.sphere_blocks.len()
+}
+
+/// The numbers that the walk expects next.
+struct Next {
+    bundle: usize,
+    triangle_block: usize,
+    sphere_block: usize,
+}
+
+impl Next {
+    /// Whether a bundle's lanes continue the numbers, with empty lanes last, and are not all empty.
+    fn passes<const W: usize>(&mut self, bundle: &Bundle<W>) -> bool {
+        let used = bundle.refs.iter().take_while(|r| **r != ChildRef::NONE).count();
+        let empty = Bundle::<W>::EMPTY;
+        let rest_is_empty = bundle.refs[used..] == empty.refs[used..]
+            && bundle.walls.iter().zip(empty.walls).all(|(a, b)| a[used..] == b[used..]);
+        used > 0
+            && rest_is_empty
+            && bundle.refs[..used].iter().all(|child| {
+                let (expected, next) = match child.leaf_block() {
+                    _ if !child.is_leaf() => {
+                        (ChildRef::bundle(self.bundle as u32), &mut self.bundle)
+                    }
+                    (KIND_SPHERES, _) => (
+                        ChildRef::leaf(KIND_SPHERES, self.sphere_block as u32),
+                        &mut self.sphere_block,
+                    ),
+                    (kind, _) => {
+                        (ChildRef::leaf(kind, self.triangle_block as u32), &mut self.triangle_block)
+                    }
+                };
+                *next += 1;
+                *child == expected
+            })
     }
 }
 

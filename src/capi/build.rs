@@ -12,9 +12,9 @@ use super::types::{
 };
 use super::versioned::{self, Output, pointer};
 use super::{accel_at, guard};
-use crate::accel::{Accel, Info, Kind};
+use crate::accel::{Accel, Info, Kind, Layout};
 use crate::build::{
-    BuildOptions, Layout, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
+    BuildOptions, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
 };
 use crate::error::BuildError;
 use crate::scene::Scene;
@@ -306,10 +306,14 @@ impl RtInfo {
             Kind::Grid => RT_KIND_GRID,
             Kind::Bvh => RT_KIND_BVH,
         };
+        let layout = match info.layout {
+            Layout::Automatic | Layout::Compact => RT_LAYOUT_COMPACT,
+            Layout::Wide(width) => width,
+        };
         RtInfo {
             struct_size,
             kind,
-            layout: RT_LAYOUT_COMPACT,
+            layout,
             lower: info.lower,
             upper: info.upper,
             triangle_count: info.triangle_count,

@@ -98,6 +98,7 @@ impl From<BuildError> for Error {
             BuildError::OutOfMemory { .. } => Error::OutOfMemory,
             BuildError::Misaligned => Error::Misaligned,
             BuildError::TooLarge => Error::TooLarge,
+            BuildError::NoSuchLayout { .. } => Error::InvalidArgument,
             BuildError::Unsupported(_) => Error::Unsupported,
         }
     }

@@ -3,7 +3,7 @@
 use super::plan::Plan;
 use crate::block::cells::{EMPTY, GridHead, LAST, Run, run_word};
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, SphereBlock, TriangleBlock, block_ref};
-use crate::block::{Census, Counts, KIND_GRID, PartsMut};
+use crate::block::{Census, Counts, KIND_GRID, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
 use crate::math::Aabb;
 use crate::prim::{Packer, Shape, Survey, for_each_prim, geometries, shape};
@@ -39,7 +39,7 @@ pub(crate) fn build(
     let runs = count_runs(&plan.head, &packed, bytes).ok_or(short)?;
     let counts = Counts { runs, ..packed };
     fill_runs(&plan.head, &counts, bytes).ok_or(short)?;
-    counts.seal(KIND_GRID, census, bytes).ok_or(short)
+    counts.seal(KIND_GRID, LAYOUT_COMPACT, census, bytes).ok_or(short)
 }
 
 /// Sorts the primitives by cell and packs them; returns the number of triangle blocks.

@@ -27,6 +27,8 @@ struct Fill {
     vertices: usize,
     /// The entry of `prim_ids` that the next primitive gets.
     next_id: u32,
+    /// Whether the last block takes no more.
+    closed: bool,
 }
 
 impl<'b> Packer<'b> {
@@ -44,6 +46,12 @@ impl<'b> Packer<'b> {
     /// The number of triangle blocks in use.
     pub fn triangle_block_count(&self) -> usize {
         self.triangles.blocks
+    }
+
+    /// Lets the next primitive begin a block, of whichever kind it is.
+    pub fn close(&mut self) {
+        self.triangles.closed = true;
+        self.spheres.closed = true;
     }
 
     /// Adds a primitive; returns the block it went to, as [`LeafRef::block`] has it, and its lane.
@@ -71,7 +79,8 @@ impl<'b> Packer<'b> {
         let fill = &mut self.triangles;
         let open = fill.blocks.checked_sub(1).and_then(|b| self.triangle_blocks.get(b));
         let fits = open.is_some_and(|block| {
-            (block.count as usize) < TRIANGLES
+            !fill.closed
+                && (block.count as usize) < TRIANGLES
                 && fill.vertices + missing(block, fill.vertices, &corners) <= TRIANGLES
         });
         if !fits {
@@ -79,6 +88,7 @@ impl<'b> Packer<'b> {
                 TriangleBlock { first: fill.next_id, ..TriangleBlock::EMPTY };
             fill.blocks += 1;
             fill.vertices = 0;
+            fill.closed = false;
         }
         let number = fill.blocks - 1;
         let block = self.triangle_blocks.get_mut(number)?;
@@ -103,10 +113,11 @@ impl<'b> Packer<'b> {
     fn push_sphere(&mut self, [x, y, z]: [f32; 3], radius: f32) -> Option<(u32, u32)> {
         let fill = &mut self.spheres;
         let open = fill.blocks.checked_sub(1).and_then(|b| self.sphere_blocks.get(b));
-        if open.is_none_or(|block| block.count as usize == SPHERES) {
+        if fill.closed || open.is_none_or(|block| block.count as usize == SPHERES) {
             *self.sphere_blocks.get_mut(fill.blocks)? =
                 SphereBlock { first: fill.next_id, ..SphereBlock::EMPTY };
             fill.blocks += 1;
+            fill.closed = false;
         }
         let number = fill.blocks - 1;
         let block = self.sphere_blocks.get_mut(number)?;

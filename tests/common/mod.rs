@@ -1,13 +1,15 @@
-//! The three structures over one scene, and answers as bits.
+//! All structures over one scene, and answers as bits.
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
-use raykern::{Accel, Backend, BuildOptions, Hit, OwnedAccel, PlainList, QueryOptions, Ray, Scene};
+use raykern::{
+    Accel, Backend, BuildOptions, Hit, Layout, OwnedAccel, PlainList, QueryOptions, Ray, Scene,
+};
 use raykern_harness::make;
 use raykern_harness::model::Model;
 
-/// List, grid and BVH over one scene, each forced.
-pub struct All([(&'static str, OwnedAccel); 3]);
+/// List, grid and BVH in every layout over one scene, each forced.
+pub struct All([(&'static str, OwnedAccel); 6]);
 
 /// Uses the backend that the environment's `RAYKERN_BACKEND` names, if it names one.
 pub fn choose_backend() {
@@ -21,10 +23,18 @@ impl All {
         choose_backend();
         let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
         let never = with(PlainList::Never);
+        let bvh = |layout| {
+            let built = OwnedAccel::bvh(scene, &BuildOptions { layout, ..never }).expect("a BVH");
+            Accel::open(built.accel().block()).expect("a sound block");
+            built
+        };
         All([
             ("list", OwnedAccel::bvh(scene, &with(PlainList::Always)).expect("a list")),
             ("grid", OwnedAccel::grid(scene, &never).expect("a grid")),
-            ("bvh", OwnedAccel::bvh(scene, &never).expect("a BVH")),
+            ("compact", bvh(Layout::Compact)),
+            ("wide 4", bvh(Layout::Wide(4))),
+            ("wide 8", bvh(Layout::Wide(8))),
+            ("wide 16", bvh(Layout::Wide(16))),
         ])
     }
 
@@ -32,8 +42,8 @@ impl All {
         model.with_scene(Self::build)
     }
 
-    pub fn accels(&self) -> [(&'static str, Accel<'_>); 3] {
-        [0, 1, 2].map(|i| (self.0[i].0, self.0[i].1.accel()))
+    pub fn accels(&self) -> [(&'static str, Accel<'_>); 6] {
+        [0, 1, 2, 3, 4, 5].map(|i| (self.0[i].0, self.0[i].1.accel()))
     }
 }
 

@@ -1,13 +1,17 @@
-//! From a scene to a finished BVH in the caller's memory.
+//! The compact layout: from a scene to binary nodes in the caller's memory.
 
 use super::MAX_DEPTH;
-use super::tree::{Grown, PrimRef, grow, leaf_budget};
+use super::tree::{Grown, Limits, PrimRef, gather, grow, leaf_budget};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
-use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
+use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{Packer, Shape, Survey, for_each_prim, geometries, shape};
+use crate::prim::{Packer, Survey, geometries, shape};
 use crate::scene::Scene;
 use crate::storage;
+
+/// Primitives of a leaf at most. Six triangles never need more than the rest of one block and a
+/// second one.
+const LEAF_MAX: usize = 6;
 
 /// The sizes of the parts, with room for the most that they may need.
 ///
@@ -69,7 +73,7 @@ pub(crate) fn build(
     let counts = Counts { nodes: node_count as u32, ..plan.packing };
     let triangle_blocks = pack_leaves(scene, census, &counts, bytes).ok_or(short)?;
     let counts = Counts { triangle_blocks: triangle_blocks as u32, ..counts };
-    counts.seal(KIND_BVH, census, bytes).ok_or(short)
+    counts.seal(KIND_BVH, LAYOUT_COMPACT, census, bytes).ok_or(short)
 }
 
 /// Grows the tree and writes geometries and ids; returns the number of nodes.
@@ -78,15 +82,10 @@ fn grow_tree(scene: &Scene, census: &Census, plan: &Plan, bytes: &mut [u8]) -> O
         plan.growing.parts_mut(bytes)?;
     geometries(scene, table);
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
-    let mut free = refs.iter_mut();
-    for_each_prim(scene, |prim| {
-        if let Some(r) = free.next() {
-            let sphere = matches!(prim.shape, Shape::Sphere { .. });
-            *r = PrimRef::new(prim.id, &prim.shape.aabb(), sphere);
-        }
-    });
+    gather(scene, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-    let node_count = grow(nodes, refs, plan.leaves, mixed)?;
+    let limits = Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false };
+    let node_count = grow(nodes, refs, &limits)?;
     // Triangles first, then spheres, each in the order of the leaves.
     let kinds = [0, 1].into_iter().flat_map(|kind| refs.iter().filter(move |r| r.sphere == kind));
     for (id, r) in prim_ids.iter_mut().zip(kinds) {

@@ -1,0 +1,212 @@
+//! From a binary tree to bundles and whole leaf blocks: which subtree becomes what, at the least cost.
+
+use super::MAX_DEPTH;
+use super::fits::Corners;
+use super::tree::{Areas, Grown};
+use crate::block::leaf::{SPHERES, TRIANGLES};
+use crate::block::{BvhNode, Geometry};
+use crate::math::Aabb;
+use crate::prim::{Shape, shape};
+use crate::scene::Scene;
+
+/// What becomes of an inner node.
+///
+/// ```text
+/// bit 0     1 .. 5   6 .. 7      8 .. 63
+///     | leaf | least | nothing | left[3] .. left[16], four bits each |
+/// ```
+///
+/// Given one lane of a bundle, the node is a leaf (`leaf`) or a bundle of its own. Given `slots` lanes, at
+/// least `least` of them, its children share them: `left[slots]` for the left one, the others for
+/// the right one. Given fewer it takes one.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Choice(pub u64);
+
+impl Choice {
+    fn new<const W: usize>(leaf: bool, least: usize, left: &[u32; W]) -> Choice {
+        let splits = left.iter().skip(2).zip((8..).step_by(4));
+        let left = splits.fold(0, |bits, (left, place)| bits | u64::from(*left) << place);
+        Choice(u64::from(leaf) | (least as u64) << 1 | left)
+    }
+
+    /// Whether the node is a leaf where it has one lane.
+    pub fn is_leaf(self) -> bool {
+        self.0 & 1 != 0
+    }
+
+    /// Whether the node takes one lane although it may have `slots`.
+    pub fn takes_one(self, slots: usize) -> bool {
+        slots < (self.0 >> 1 & 31) as usize
+    }
+
+    /// How many of `slots >= 2` lanes go to the left child.
+    pub fn left_of(self, slots: usize) -> usize {
+        if slots < 3 { 1 } else { (self.0 >> (4 * slots - 4) & 15) as usize }
+    }
+}
+
+/// The choice at an inner node; those of pairs stand in the order of the pairs.
+pub(crate) fn choice_of(choices: &[u64], node: &BvhNode) -> Option<Choice> {
+    choices.get((node.first as usize / 2).checked_sub(1)?).map(|bits| Choice(*bits))
+}
+
+/// The scene, as far as it takes to know which triangles share vertices.
+pub(crate) struct Shapes<'s, 'a> {
+    pub scene: &'s Scene<'a>,
+    pub geometries: &'s [Geometry],
+    pub ids: &'s [u32],
+}
+
+/// A subtree that is decided, and what it may still be part of.
+#[derive(Clone, Copy)]
+struct Decided<const W: usize> {
+    /// The least cost with 1 .. W lanes.
+    cost: [f32; W],
+    aabb: Aabb,
+    content: Content,
+}
+
+/// What a leaf over a subtree would hold.
+#[derive(Clone, Copy)]
+enum Content {
+    Triangles {
+        count: usize,
+        corners: Corners,
+    },
+    Spheres {
+        count: usize,
+    },
+    /// Too much for one block, or both kinds.
+    Much,
+}
+
+/// Writes a choice for each inner node, so that the tree of bundles costs least.
+///
+/// A ray that enters a box pays 1 for the bundle or the leaf block in it, whatever that holds;
+/// boxes are entered in proportion to their area. `price` is added for each leaf block, and to each
+/// bundle in proportion to its bytes: it breaks ties, and a higher one saves memory. Leaf blocks
+/// hold at most 16 triangles over 16 vertices, or 15 spheres.
+///
+/// Pairs of children come after their parents and right subtrees after left ones, so the pairs in
+/// reverse are the tree in reverse Polish notation: no other stack is needed than that of results,
+/// which holds one for each level at most.
+///
+/// Source: \[Wald08\] for the wide tree, \[Ylitie17\], 3.1, for the dynamic program.
+pub(crate) fn choose<const W: usize>(
+    nodes: &[BvhNode],
+    shapes: &Shapes,
+    areas: Areas,
+    price: f32,
+    choices: &mut [u64],
+) -> Option<()> {
+    const EMPTY: Content = Content::Much;
+    let nothing = Decided { cost: [0.0; W], aabb: Aabb::EMPTY, content: EMPTY };
+    let mut stack = [nothing; MAX_DEPTH + 1];
+    let mut pending = 0;
+    for (pair, choice) in nodes.chunks_exact(2).skip(1).zip(choices).rev() {
+        let [mut left, mut right] = [nothing; 2];
+        for (node, decided) in pair.iter().zip([&mut left, &mut right]) {
+            *decided = if node.is_leaf() {
+                leaf(node, shapes, areas, price)?
+            } else {
+                pending = usize::checked_sub(pending, 1)?;
+                *stack.get(pending)?
+            };
+        }
+        let (decided, chosen) = join(&left, &right, areas, price);
+        *choice = chosen.0;
+        *stack.get_mut(pending)? = decided;
+        pending += 1;
+    }
+    Some(())
+}
+
+/// A leaf of the binary tree.
+fn leaf<const W: usize>(
+    node: &BvhNode,
+    shapes: &Shapes,
+    areas: Areas,
+    price: f32,
+) -> Option<Decided<W>> {
+    let (count, is_sphere) = Grown::of(node);
+    let aabb = node.aabb();
+    let cost = [areas.of(&aabb) + price; W];
+    if is_sphere {
+        return Some(Decided { cost, aabb, content: Content::Spheres { count } });
+    }
+    let mut corners = Corners::NONE;
+    let first = node.first as usize;
+    for id in shapes.ids.get(first..first + count)? {
+        if let Shape::Triangle(triangle) = shape(shapes.scene, shapes.geometries, *id)? {
+            // Five triangles always fit.
+            triangle.into_iter().for_each(|vertex| _ = corners.add(vertex));
+        }
+    }
+    Some(Decided { cost, aabb, content: Content::Triangles { count, corners } })
+}
+
+fn join<const W: usize>(
+    left: &Decided<W>,
+    right: &Decided<W>,
+    areas: Areas,
+    price: f32,
+) -> (Decided<W>, Choice) {
+    let mut aabb = left.aabb;
+    aabb.add(&right.aabb);
+    let area = areas.of(&aabb);
+    let content = together(&left.content, &right.content);
+    let (shared, split) = share(&left.cost, &right.cost);
+    let block = match content {
+        Content::Much => f32::INFINITY,
+        _ => area + price,
+    };
+    let bundle = area + price * bundle_price(W) + shared[W - 1];
+    let is_leaf = block <= bundle;
+    let one = if is_leaf { block } else { bundle };
+    // With more lanes the cost of sharing only falls.
+    let least = (1..W).find(|&i| shared[i] < one).map_or(W + 1, |i| i + 1);
+    let mut cost = shared;
+    cost[..(least - 1).min(W)].fill(one);
+    (Decided { cost, aabb, content }, Choice::new(is_leaf, least, &split))
+}
+
+/// Bytes of a bundle against those of a leaf block.
+fn bundle_price(width: usize) -> f32 {
+    (28 * width) as f32 / 256.0
+}
+
+/// The least cost of two subtrees that share 1 .. W lanes, and the lanes of the left one. One lane
+/// is not enough for two.
+fn share<const W: usize>(left: &[f32; W], right: &[f32; W]) -> ([f32; W], [u32; W]) {
+    let (mut cost, mut split) = ([f32::INFINITY; W], [0; W]);
+    for k in 1..W {
+        for j in k + 1..=W {
+            let sum = left[k - 1] + right[j - k - 1];
+            if sum < cost[j - 1] {
+                cost[j - 1] = sum;
+                split[j - 1] = k as u32;
+            }
+        }
+    }
+    (cost, split)
+}
+
+/// What one block would hold of both, if it can.
+fn together(a: &Content, b: &Content) -> Content {
+    match (a, b) {
+        (
+            Content::Triangles { count: n, corners },
+            Content::Triangles { count: m, corners: others },
+        ) if n + m <= TRIANGLES => {
+            let mut corners = *corners;
+            if corners.merge(others) {
+                return Content::Triangles { count: n + m, corners };
+            }
+            Content::Much
+        }
+        (Content::Spheres { count: n }, Content::Spheres { count: m }) if n + m <= SPHERES => {
+            Content::Spheres { count: n + m }
+        }
+        _ => Content::Much,
+    }
+}

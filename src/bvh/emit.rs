@@ -1,0 +1,177 @@
+//! Writes bundles and the ids of leaf blocks from what the collapse chose.
+
+use super::MAX_DEPTH;
+use super::collapse::choice_of;
+use super::tree::Grown;
+use crate::block::BvhNode;
+use crate::block::bundle::{Bundle, ChildRef};
+use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES};
+
+/// Marks, among the ids, the first one of a leaf block until the blocks are packed.
+pub(crate) const BEGINS: u32 = 1 << 31;
+
+/// The binary tree and what becomes of it.
+#[derive(Clone, Copy)]
+pub(crate) struct Chosen<'a> {
+    pub nodes: &'a [BvhNode],
+    pub choices: &'a [u64],
+    /// The ids in the order of the tree's leaves.
+    pub ids: &'a [u32],
+}
+
+/// How much there will be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Sizes {
+    pub bundles: u32,
+    pub triangle_blocks: u32,
+    pub sphere_blocks: u32,
+}
+
+/// A lane of a bundle: a node, and whether all below it is one leaf block.
+#[derive(Clone, Copy, Default)]
+struct Lane {
+    node: u32,
+    is_leaf: bool,
+}
+
+impl Chosen<'_> {
+    /// Counts the parts of the tree of bundles.
+    pub fn sizes<const W: usize>(&self) -> Option<Sizes> {
+        let mut sizes = Sizes { bundles: 1, ..Sizes::default() };
+        self.for_each_bundle::<W>(|_, lanes| {
+            for lane in lanes {
+                if !lane.is_leaf {
+                    sizes.bundles += 1;
+                } else if self.content(lane.node)?.is_sphere {
+                    sizes.sphere_blocks += 1;
+                } else {
+                    sizes.triangle_blocks += 1;
+                }
+            }
+            Some(())
+        })?;
+        Some(sizes)
+    }
+
+    /// Writes the bundles, and the ids in the order of the leaf blocks: those of triangles first,
+    /// those of spheres from `first_sphere`. The first id of each block is [marked](BEGINS).
+    ///
+    /// The order is the one that [`bundles_are_sound`](super::bundles_are_sound) expects.
+    pub fn emit<const W: usize>(
+        &self,
+        bundles: &mut [Bundle<W>],
+        ids: &mut [u32],
+        first_sphere: usize,
+    ) -> Option<()> {
+        let (triangles, spheres) = ids.split_at_mut_checked(first_sphere)?;
+        let mut kinds = [(KIND_TRIANGLES, triangles, 0), (KIND_SPHERES, spheres, 0)];
+        self.for_each_bundle::<W>(|numbers, lanes| {
+            let (number, mut next_child) = numbers;
+            let bundle = bundles.get_mut(number as usize)?;
+            *bundle = Bundle::EMPTY;
+            for (i, lane) in lanes.iter().enumerate() {
+                let aabb = self.nodes.get(lane.node as usize)?.aabb();
+                for k in 0..3 {
+                    bundle.walls[k][i] = aabb.lower[k];
+                    bundle.walls[3 + k][i] = aabb.upper[k];
+                }
+                bundle.refs[i] = if lane.is_leaf {
+                    let content = self.content(lane.node)?;
+                    let (kind, free, blocks) = &mut kinds[usize::from(content.is_sphere)];
+                    let (own, rest) =
+                        core::mem::take(free).split_at_mut_checked(content.end - content.first)?;
+                    own.copy_from_slice(self.ids.get(content.first..content.end)?);
+                    *own.first_mut()? |= BEGINS;
+                    *free = rest;
+                    *blocks += 1;
+                    ChildRef::leaf(*kind, *blocks - 1)
+                } else {
+                    next_child += 1;
+                    ChildRef::bundle(next_child - 1)
+                };
+            }
+            Some(())
+        })
+    }
+
+    /// Calls `f` with the number of each bundle, the number of its first inner child, and its lanes,
+    /// parents before children and subtree after subtree.
+    fn for_each_bundle<const W: usize>(
+        &self,
+        mut f: impl FnMut((u32, u32), &[Lane]) -> Option<()>,
+    ) -> Option<()> {
+        // Nodes with the numbers of their bundles; each level leaves at most all lanes but one behind.
+        let mut stack = [(0u32, 0u32); MAX_DEPTH * 15 + 1];
+        let (mut pending, mut next) = (1, 1);
+        while pending > 0 {
+            pending -= 1;
+            let (node, number) = stack[pending];
+            let mut lanes = [Lane::default(); W];
+            let count = self.lanes_of(node, &mut lanes)?;
+            let lanes = lanes.get(..count)?;
+            f((number, next), lanes)?;
+            let children = lanes.iter().filter(|lane| !lane.is_leaf);
+            for (lane, number) in children.clone().zip(next..) {
+                *stack.get_mut(pending)? = (lane.node, number);
+                pending += 1;
+            }
+            let count = children.count();
+            stack.get_mut(pending - count..pending)?.reverse();
+            next += count as u32;
+        }
+        Some(())
+    }
+
+    /// The lanes of the bundle that stands for `node`, left before right.
+    fn lanes_of<const W: usize>(&self, node: u32, lanes: &mut [Lane; W]) -> Option<usize> {
+        let mut stack = [(0u32, 0usize); W];
+        stack[0] = (node, W);
+        let (mut pending, mut count) = (1, 0);
+        while pending > 0 {
+            pending -= 1;
+            let (at, slots) = stack[pending];
+            let node_at = self.nodes.get(at as usize)?;
+            let choice = if node_at.is_leaf() { None } else { choice_of(self.choices, node_at) };
+            // A bundle's own node is split, unless it is the root and all is one leaf.
+            let is_leaf = choice.is_none_or(|c| c.is_leaf());
+            match choice {
+                Some(choice)
+                    if slots > 1
+                        && (at == node && !(at == 0 && is_leaf)
+                            || at != node && !choice.takes_one(slots)) =>
+                {
+                    let left = choice.left_of(slots);
+                    *stack.get_mut(pending)? = (node_at.first + 1, slots.checked_sub(left)?);
+                    *stack.get_mut(pending + 1)? = (node_at.first, left);
+                    pending += 2;
+                }
+                _ => {
+                    *lanes.get_mut(count)? = Lane { node: at, is_leaf };
+                    count += 1;
+                }
+            }
+        }
+        Some(count)
+    }
+
+    /// What lies below a node that is a leaf.
+    fn content(&self, node: u32) -> Option<Content> {
+        let (mut left, mut right) = (node, node);
+        while let Some(inner) = self.nodes.get(left as usize).filter(|n| !n.is_leaf()) {
+            left = inner.first;
+        }
+        while let Some(inner) = self.nodes.get(right as usize).filter(|n| !n.is_leaf()) {
+            right = inner.first + 1;
+        }
+        let (left, right) = (self.nodes.get(left as usize)?, self.nodes.get(right as usize)?);
+        let (count, is_sphere) = Grown::of(right);
+        Some(Content { first: left.first as usize, end: right.first as usize + count, is_sphere })
+    }
+}
+
+/// The ids `first .. end` of one leaf block.
+struct Content {
+    first: usize,
+    end: usize,
+    is_sphere: bool,
+}

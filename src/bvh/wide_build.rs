@@ -1,0 +1,237 @@
+//! The wide layouts: from a scene to bundles in the caller's memory.
+
+use super::collapse::{Shapes, choose};
+use super::compact;
+use super::emit::{BEGINS, Chosen, Sizes};
+use super::tree::{Areas, Limits, PrimRef, gather, grow, leaf_budget};
+use crate::block::bundle::{Bundle, LANE};
+use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
+use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
+use crate::error::BuildError;
+use crate::prim::{Packer, Survey, geometries, shape};
+use crate::scene::Scene;
+use crate::storage::{self, ALIGNMENT, Plain};
+
+/// Primitives of a leaf of the binary tree at most: any five triangles fit into a block.
+const LEAF_MAX: usize = TRIANGLES_AT_LEAST;
+
+/// Where the scratch lies while the tree grows: behind all that is finished, at the end of the
+/// memory.
+///
+/// ```text
+/// | header | geometries | ...      | refs                | nodes |    growing
+/// | header | geometries | ...      | choices | ids       | nodes |    choosing
+/// | header | geometries | prim_ids | bundles | choices | ids | nodes | emitting
+/// | header | geometries | prim_ids | bundles | spheres | triangles | packing
+/// ```
+struct Places {
+    refs: usize,
+    nodes: usize,
+    /// Leaves of the binary tree at most.
+    leaves: usize,
+}
+
+impl Places {
+    /// The places in memory of `size` bytes; `None` when they do not fit.
+    fn new(survey: &Survey, census: &Census, size: usize) -> Option<Places> {
+        let mixed = census.triangle_count > 0 && census.sphere_count > 0;
+        let prims = census.hittable() as usize;
+        let [most, least] = [true, false].map(|full| leaf_budget(prims, mixed, full));
+        let front = front(survey)?;
+        let size = size / ALIGNMENT * ALIGNMENT;
+        let refs = prims.checked_mul(size_of::<PrimRef>())?;
+        let pair = 2 * size_of::<BvhNode>();
+        let room = size.checked_sub(front)?.checked_sub(refs)? / pair;
+        let leaves = most.min(room);
+        let nodes = size - leaves * pair;
+        (leaves >= least).then_some(Places { refs: nodes - refs, nodes, leaves })
+    }
+}
+
+/// The end of header and geometries.
+fn front(survey: &Survey) -> Option<usize> {
+    let counts = Counts { geometries: survey.geometry_count, ..Counts::default() };
+    counts.offsets().map(|at| at.end)
+}
+
+/// The bytes for a good tree of bundles, and the bytes below which there is no tree at all.
+pub(crate) fn needs_wide(
+    survey: &Survey,
+    census: &Census,
+    width: u32,
+) -> Result<(usize, usize), BuildError> {
+    let (compact, minimum) = compact::needs(survey, census)?;
+    let blocks = census.triangle_count.div_ceil(4) + census.sphere_count.div_ceil(8);
+    let sizes = Sizes {
+        bundles: 1 + 2 * blocks / width,
+        triangle_blocks: census.triangle_count.div_ceil(4),
+        sphere_blocks: census.sphere_count.div_ceil(8),
+    };
+    let finished = counts(survey, census, &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
+    Ok((compact.max(finished.end), minimum))
+}
+
+/// The parts of the finished block.
+fn counts(survey: &Survey, census: &Census, sizes: &Sizes, width: u32) -> Counts {
+    Counts {
+        geometries: survey.geometry_count,
+        prim_ids: census.hittable(),
+        bundle_lanes: sizes.bundles.saturating_mul(width),
+        sphere_blocks: sizes.sphere_blocks,
+        triangle_blocks: sizes.triangle_blocks,
+        ..Counts::default()
+    }
+}
+
+/// Builds bundles of `width` lanes into `bytes`, which are zero and at least the minimum of
+/// [`needs_wide`]; returns the size of the finished block. At least one primitive can be hit.
+///
+/// Where memory is short, the leaf blocks become fewer and fuller, at the cost of the rays, and where
+/// that is not enough the layout is the compact one.
+pub(crate) fn build_wide(
+    scene: &Scene,
+    survey: &Survey,
+    census: &Census,
+    width: u32,
+    bytes: &mut [u8],
+) -> Result<usize, BuildError> {
+    let built = match width {
+        4 => build::<4>(scene, survey, census, bytes),
+        8 => build::<8>(scene, survey, census, bytes),
+        _ => build::<16>(scene, survey, census, bytes),
+    };
+    built.map_or_else(
+        || {
+            bytes.fill(0);
+            compact::build(scene, survey, census, bytes)
+        },
+        Ok,
+    )
+}
+
+fn build<const W: usize>(
+    scene: &Scene,
+    survey: &Survey,
+    census: &Census,
+    bytes: &mut [u8],
+) -> Option<usize>
+where
+    Bundle<W>: Plain,
+{
+    let places = Places::new(survey, census, bytes.len())?;
+    let nodes = grow_tree(scene, survey, census, &places, bytes)?;
+    let scratch = Scratch::new(census, &places, nodes)?;
+    let prims = census.hittable();
+    let areas = Areas::new(&census.bounds);
+    let whole = areas.of(&census.bounds);
+    let mean = whole / prims as f32;
+    for price in [whole / (1u64 << 36) as f32, mean, 8.0 * mean, 64.0 * mean, whole] {
+        let sizes = scratch.choose::<W>(scene, survey, areas, price, bytes)?;
+        let counts = counts(survey, census, &sizes, W as u32);
+        let at = counts.offsets()?;
+        if at.words <= scratch.choices && at.end <= bytes.len() {
+            scratch.emit::<W>(census, &counts, bytes)?;
+            pack(scene, census, &counts, bytes)?;
+            return counts.seal(KIND_BVH, W as u32, census, bytes);
+        }
+    }
+    None
+}
+
+/// Grows the binary tree, and moves the ids behind the refs' place; returns the number of nodes.
+fn grow_tree(
+    scene: &Scene,
+    survey: &Survey,
+    census: &Census,
+    places: &Places,
+    bytes: &mut [u8],
+) -> Option<usize> {
+    let front = Counts { geometries: survey.geometry_count, ..Counts::default() };
+    geometries(scene, front.parts_mut(bytes)?.geometries);
+    let prims = census.hittable() as usize;
+    let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
+    let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
+    let refs = storage::view_mut::<PrimRef>(front, places.refs, prims)?;
+    gather(scene, refs);
+    let mixed = census.triangle_count > 0 && census.sphere_count > 0;
+    let limits = Limits { leaves: places.leaves, leaf_max: LEAF_MAX, mixed, deep: true };
+    let count = grow(nodes, refs, &limits)?;
+    // From the last on, each id goes to the end of the refs' place, onto refs that are done.
+    let words = storage::view_mut::<u32>(front, places.refs, 8 * prims)?;
+    for i in (0..prims).rev() {
+        words[7 * prims + i] = words[8 * i + 3];
+    }
+    Some(count)
+}
+
+/// The tree, its choices and the ids, at the end of the memory.
+struct Scratch {
+    choices: usize,
+    pairs: usize,
+    ids: usize,
+    prims: usize,
+    nodes: usize,
+    node_count: usize,
+}
+
+impl Scratch {
+    fn new(census: &Census, places: &Places, node_count: usize) -> Option<Scratch> {
+        let prims = census.hittable() as usize;
+        let pairs = node_count / 2 - 1;
+        let ids = places.nodes - 4 * prims;
+        let choices = (ids / 8 * 8).checked_sub(8 * pairs)?;
+        Some(Scratch { choices, pairs, ids, prims, nodes: places.nodes, node_count })
+    }
+
+    fn choose<const W: usize>(
+        &self,
+        scene: &Scene,
+        survey: &Survey,
+        areas: Areas,
+        price: f32,
+        bytes: &mut [u8],
+    ) -> Option<Sizes> {
+        let (front, tail) = bytes.split_at_mut_checked(self.ids)?;
+        let ids = storage::view::<u32>(tail, 0, self.prims)?;
+        let nodes = storage::view::<BvhNode>(tail, self.nodes - self.ids, self.node_count)?;
+        let (front, middle) = front.split_at_mut_checked(self.choices)?;
+        let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
+        let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
+        let geometries = table.parts_mut(front)?.geometries;
+        choose::<W>(nodes, &Shapes { scene, geometries, ids }, areas, price, choices)?;
+        Chosen { nodes, choices, ids }.sizes::<W>()
+    }
+
+    fn emit<const W: usize>(&self, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Option<()>
+    where
+        Bundle<W>: Plain,
+    {
+        let (front, tail) = bytes.split_at_mut_checked(self.choices)?;
+        let choices = storage::view::<u64>(tail, 0, self.pairs)?;
+        let ids = storage::view::<u32>(tail, self.ids - self.choices, self.prims)?;
+        let nodes = storage::view::<BvhNode>(tail, self.nodes - self.choices, self.node_count)?;
+        let chosen = Chosen { nodes, choices, ids };
+        let front_counts = Counts { sphere_blocks: 0, triangle_blocks: 0, ..*counts };
+        let PartsMut { prim_ids, bundles, .. } = front_counts.parts_mut(front)?;
+        let count = bundles.len() / (W * LANE);
+        let bundles = storage::view_mut::<Bundle<W>>(bundles, 0, count)?;
+        chosen.emit(bundles, prim_ids, census.triangle_count as usize)
+    }
+}
+
+/// Packs the leaf blocks in the order of the ids and takes the marks off them.
+fn pack(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Option<()> {
+    let PartsMut { geometries, prim_ids, sphere_blocks, triangle_blocks, .. } =
+        counts.parts_mut(bytes)?;
+    let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    for id in prim_ids {
+        if *id & BEGINS != 0 {
+            packer.close();
+        }
+        *id &= !BEGINS;
+        packer.push(&shape(scene, geometries, *id)?)?;
+    }
+    (packer.triangle_block_count() == counts.triangle_blocks as usize).then_some(())
+}
+
+const _: () = assert!(SPHERES >= LEAF_MAX);
