@@ -120,9 +120,9 @@ impl Candidate {
         if near > ray.t_min && far < ray.t_max {
             return true;
         }
-        Distance::new(ray, &self.meeting).is_some_and(|t| {
-            t.compare_with(ray.t_min) != Ordering::Less
-                && t.compare_with(ray.t_max) != Ordering::Greater
+        Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
+            t.compare_with(ray.t_min as f32) != Ordering::Less
+                && t.compare_with(ray.t_max as f32) != Ordering::Greater
         })
     }
 
@@ -133,8 +133,10 @@ impl Candidate {
         let by_float = || self.t.partial_cmp(&other.t).unwrap_or(Ordering::Equal);
         let by_t = if apart {
             by_float()
+        } else if self.meeting.surely_equal(&other.meeting) {
+            Ordering::Equal
         } else {
-            let distance = |candidate: &Candidate| Distance::new(ray, &candidate.meeting);
+            let distance = |candidate: &Candidate| Distance::new(&ray.line(), &candidate.meeting);
             distance(self).zip(distance(other)).map_or_else(by_float, |(p, q)| p.compare(&q))
         };
         by_t.then(self.prim.cmp(&other.prim))
@@ -147,7 +149,7 @@ impl Candidate {
         if near as f32 == nearest && far as f32 == nearest {
             return nearest;
         }
-        Distance::new(ray, &self.meeting).map_or(nearest, |t| t.round())
+        Distance::new(&ray.line(), &self.meeting).map_or(nearest, |t| t.round())
     }
 }
 

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use crate::exact::Line;
 use crate::math::rounding::gamma;
 use crate::math::{Aabb, sum_abs, wide};
 
@@ -121,6 +122,12 @@ impl Ray {
 }
 
 impl PreparedRay {
+    /// Origin and direction as they were given.
+    pub fn line(&self) -> Line {
+        let given = |v: DVec3| v.to_array().map(|x| x as f32);
+        Line { origin: given(self.origin), direction: given(self.direction) }
+    }
+
     /// The part of the ray inside `[lower, upper]` with `t_min <= t <= t_bound`.
     ///
     /// Conservative: if a point of the ray with such a `t` lies, in real arithmetic, in the closed

@@ -9,3 +9,8 @@ pub(crate) fn sqrt(x: f64) -> f64 {
     #[cfg(not(feature = "std"))]
     return libm::sqrt(x);
 }
+
+/// `2^n`; for what is not a normal float, the nearest power that is.
+pub(crate) fn power_of_two(n: i32) -> f64 {
+    f64::from_bits(((n.clamp(-1022, 1023) + 1023) as u64) << 52)
+}

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::exact::Roots;
-use crate::math::expansion::{two_product, two_sum};
+use crate::math::error_free::{two_product, two_sum};
 use crate::math::float::sqrt;
 use crate::math::rounding::UNIT;
 use crate::math::{sum_abs, wide};
@@ -71,7 +71,7 @@ pub(crate) fn intersect(ray: &PreparedRay, centre: [f32; 3], radius: f32) -> Opt
 
 /// The same, computed without error and rounded.
 fn exactly(ray: &PreparedRay, centre: [f32; 3], radius: f32) -> Option<SphereHit> {
-    let roots = Roots::new(ray, centre, radius)?;
+    let roots = Roots::new(&ray.line(), centre, radius)?;
     let [(enter, enter_error), (leave, leave_error)] = roots.approximate();
     Some(SphereHit {
         t: [enter, leave],

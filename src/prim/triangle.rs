@@ -1,7 +1,5 @@
 //! Ray against triangle: filters in `f64`, and real arithmetic where they are unsure.
 
-use core::cmp::Ordering;
-
 use glam::DVec3;
 
 use crate::exact::{self, Distance, Meeting};
@@ -30,7 +28,7 @@ pub(crate) struct TriangleHit {
 /// `|d| (|p| + |q|) |q - p|` in the norm of absolute sums. What is not larger than that bound is
 /// computed again without error.
 ///
-/// Source: \[DEG12\]; filter and exact part after \[She97\].
+/// Source: \[DEG12\]; the filter after \[She97\].
 pub(crate) fn intersect(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<TriangleHit> {
     let [a, b, c] = triangle.map(wide);
     let o = ray.origin;
@@ -54,9 +52,9 @@ pub(crate) fn intersect(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<Tr
 
 /// The volumes, if all that are not zero have one sign; each within one unit in the last place.
 fn exact_volumes(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<[f64; 3]> {
-    let volumes = exact::volumes(ray, triangle);
-    let has = |sign| volumes.iter().any(|volume| volume.sign() == sign);
-    (has(Ordering::Less) != has(Ordering::Greater)).then(|| volumes.map(|v| v.approximate()))
+    let volumes = exact::volumes(&ray.line(), triangle);
+    let (below, above) = (volumes.iter().any(|v| *v < 0.0), volumes.iter().any(|v| *v > 0.0));
+    (below != above).then_some(volumes)
 }
 
 /// The `t` at which the ray meets the triangle's plane, and a bound on its error.
@@ -75,7 +73,7 @@ fn plane(ray: &PreparedRay, triangle: [[f32; 3]; 3]) -> Option<(f64, f64)> {
         // A hundredth for the divisor's own error, and the rounding of the quotient.
         return Some((t, 1.01 * t_error + 2.0 * UNIT * t.abs()));
     }
-    Some(Distance::new(ray, &Meeting::Triangle(triangle))?.approximate())
+    Some(Distance::new(&ray.line(), &Meeting::Triangle(triangle))?.approximate())
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.

@@ -1,0 +1,236 @@
+//! Whole numbers of many words, on the stack.
+
+use core::cmp::Ordering;
+use core::ops::{Add, Mul, Neg, Sub};
+
+use super::float::power_of_two;
+
+/// A number system in which a formula is evaluated without error.
+///
+/// `i128` where everything fits, which is nearly always; [`Integer`] for the rest. Whoever chooses one
+/// has bounded the results beforehand, so no operation overflows.
+pub(crate) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
+    /// `mantissa * 2^shift`.
+    fn scaled(mantissa: i32, shift: u32) -> Self;
+
+    /// The same number.
+    fn of<const WORDS: usize>(number: &Integer<WORDS>) -> Self;
+
+    /// The same number.
+    fn to_integer<const WORDS: usize>(self) -> Integer<WORDS>;
+
+    /// The number times `2^by`.
+    fn shifted(self, by: u32) -> Self;
+
+    /// The order against zero.
+    fn sign(&self) -> Ordering;
+}
+
+/// A whole number below `2^(64 WORDS)` in size: a sign, and words of which the lowest is the first.
+///
+/// Operations touch the words in use and no others. What does not fit is dropped; callers prove that
+/// everything fits.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Integer<const WORDS: usize> {
+    /// Zero from `length` on; the last one in use is not zero.
+    words: [u64; WORDS],
+    length: usize,
+    /// Means nothing when the number is zero.
+    negative: bool,
+}
+
+impl<const WORDS: usize> Integer<WORDS> {
+    /// The number of bits of the size: zero for zero.
+    pub fn bits(&self) -> u32 {
+        match self.used() {
+            [.., last] => 64 * self.length as u32 - last.leading_zeros(),
+            [] => 0,
+        }
+    }
+
+    /// The number times `2^exponent` in `f64`, while that is in the normal range.
+    ///
+    /// Within `1.001 UNIT` of it: the bits below the highest 64 are cut off, and 64 are rounded to 53.
+    pub fn approximate(&self, exponent: i32) -> f64 {
+        let (high, low) = match *self.used() {
+            [.., low, high] => (high, low),
+            [high] => (high, 0),
+            [] => return 0.0,
+        };
+        let spare = high.leading_zeros();
+        let top = ((u128::from(high) << 64 | u128::from(low)) << spare >> 64) as u64;
+        let scale = exponent + 64 * (self.length as i32 - 1) - spare as i32;
+        let size = top as f64 * power_of_two(scale);
+        if self.negative { -size } else { size }
+    }
+
+    fn used(&self) -> &[u64] {
+        &self.words[..self.length]
+    }
+
+    /// The number of these words, of which the first `most` may not be zero.
+    fn trimmed(words: [u64; WORDS], most: usize, negative: bool) -> Self {
+        let highest = words.iter().take(most).rposition(|word| *word != 0);
+        Integer { words, length: highest.map_or(0, |place| place + 1), negative }
+    }
+
+    /// `self` plus the size of `other` with the sign `negative`.
+    fn plus(&self, other: &Self, negative: bool) -> Self {
+        if self.negative == negative {
+            return self.joined(other);
+        }
+        match self.compare_sizes(other) {
+            Ordering::Less => other.reduced(self, negative),
+            _ => self.reduced(other, self.negative),
+        }
+    }
+
+    fn compare_sizes(&self, other: &Self) -> Ordering {
+        let by_length = self.length.cmp(&other.length);
+        by_length.then_with(|| self.used().iter().rev().cmp(other.used().iter().rev()))
+    }
+
+    /// The sum of both sizes, with the sign of `self`.
+    fn joined(&self, other: &Self) -> Self {
+        let mut words = [0; WORDS];
+        let most = self.length.max(other.length) + 1;
+        let mut carry = false;
+        for ((word, x), y) in words.iter_mut().zip(&self.words).zip(&other.words).take(most) {
+            let (sum, over) = x.overflowing_add(*y);
+            let (sum, over_again) = sum.overflowing_add(u64::from(carry));
+            (*word, carry) = (sum, over | over_again);
+        }
+        Self::trimmed(words, most, self.negative)
+    }
+
+    /// The size of `self` less that of `other`, which is not larger.
+    fn reduced(&self, other: &Self, negative: bool) -> Self {
+        let mut words = [0; WORDS];
+        let mut borrow = false;
+        for ((word, x), y) in words.iter_mut().zip(self.used()).zip(&other.words) {
+            let (rest, under) = x.overflowing_sub(*y);
+            let (rest, under_again) = rest.overflowing_sub(u64::from(borrow));
+            (*word, borrow) = (rest, under | under_again);
+        }
+        Self::trimmed(words, self.length, negative)
+    }
+}
+
+impl<const WORDS: usize> Add for Integer<WORDS> {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        self.plus(&other, other.negative)
+    }
+}
+
+impl<const WORDS: usize> Sub for Integer<WORDS> {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self.plus(&other, !other.negative)
+    }
+}
+
+impl<const WORDS: usize> Neg for Integer<WORDS> {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Integer { negative: !self.negative, ..self }
+    }
+}
+
+impl<const WORDS: usize> Mul for Integer<WORDS> {
+    type Output = Self;
+    fn mul(self, other: Self) -> Self {
+        let mut words = [0; WORDS];
+        for (i, x) in self.used().iter().enumerate() {
+            let mut carry = 0;
+            let mut places = words.iter_mut().skip(i);
+            // The factor comes first: when it ends, no place is taken from the row of places.
+            for (y, place) in other.used().iter().zip(&mut places) {
+                let sum = u128::from(*x) * u128::from(*y) + u128::from(*place) + carry;
+                *place = sum as u64;
+                carry = sum >> 64;
+            }
+            if let Some(place) = places.next() {
+                *place = carry as u64;
+            }
+        }
+        let most = self.length + other.length;
+        Self::trimmed(words, most, self.negative != other.negative)
+    }
+}
+
+impl<const WORDS: usize> Number for Integer<WORDS> {
+    fn scaled(mantissa: i32, shift: u32) -> Self {
+        let size = u128::from(mantissa.unsigned_abs()) << (shift % 64);
+        let mut words = [0; WORDS];
+        let place = shift as usize / 64;
+        for (word, part) in words.iter_mut().skip(place).zip([size as u64, (size >> 64) as u64]) {
+            *word = part;
+        }
+        Self::trimmed(words, place + 2, mantissa < 0)
+    }
+
+    fn of<const OTHER: usize>(number: &Integer<OTHER>) -> Self {
+        let mut words = [0; WORDS];
+        words.iter_mut().zip(number.used()).for_each(|(word, x)| *word = *x);
+        Integer { words, length: number.length.min(WORDS), negative: number.negative }
+    }
+
+    fn to_integer<const OTHER: usize>(self) -> Integer<OTHER> {
+        Integer::of(&self)
+    }
+
+    fn shifted(self, by: u32) -> Self {
+        if by == 0 {
+            return self;
+        }
+        let (place, by) = (by as usize / 64, by % 64);
+        let mut words = [0; WORDS];
+        let mut carry = 0;
+        // One word beyond those in use takes the last carry.
+        for (word, x) in words.iter_mut().skip(place).zip(self.used().iter().chain([&0])) {
+            let wide = u128::from(*x) << by;
+            *word = wide as u64 | carry;
+            carry = (wide >> 64) as u64;
+        }
+        Self::trimmed(words, place + self.length + 1, self.negative)
+    }
+
+    fn sign(&self) -> Ordering {
+        match (self.length, self.negative) {
+            (0, _) => Ordering::Equal,
+            (_, true) => Ordering::Less,
+            (_, false) => Ordering::Greater,
+        }
+    }
+}
+
+impl Number for i128 {
+    fn scaled(mantissa: i32, shift: u32) -> Self {
+        i128::from(mantissa) << shift
+    }
+
+    fn of<const WORDS: usize>(number: &Integer<WORDS>) -> Self {
+        let word = |i: usize| number.words.get(i).map_or(0, |word| i128::from(*word));
+        let size = word(1) << 64 | word(0);
+        if number.negative { -size } else { size }
+    }
+
+    fn to_integer<const WORDS: usize>(self) -> Integer<WORDS> {
+        let size = self.unsigned_abs();
+        let mut words = [0; WORDS];
+        let parts = [size as u64, (size >> 64) as u64];
+        words.iter_mut().zip(parts).for_each(|(word, part)| *word = part);
+        Integer::trimmed(words, 2, self < 0)
+    }
+
+    fn shifted(self, by: u32) -> Self {
+        self << by
+    }
+
+    fn sign(&self) -> Ordering {
+        self.cmp(&0)
+    }
+}
