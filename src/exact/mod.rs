@@ -22,9 +22,9 @@ use core::cmp::Ordering;
 pub(crate) use sphere::Roots;
 pub(crate) use triangle::{has_area, volumes};
 
+use crate::math::binary::Binary;
 use sphere::Root;
 use triangle::Quotient;
-use units::Binary;
 
 /// The points `origin + t * direction`, in the floats that were given.
 #[derive(Clone, Copy, Debug)]

@@ -8,7 +8,7 @@ use core::cmp::Ordering;
 
 use super::Line;
 use super::triangle::{Quotient, shifts};
-use super::units::{Unit, Units, dot, is_short};
+use super::units::{Unit, Units, dot, in_shortest, minus};
 use crate::math::float::sqrt;
 use crate::math::integer::{Integer, Number};
 use crate::math::rounding::UNIT;
@@ -38,31 +38,12 @@ impl Roots {
     pub fn new(line: &Line, centre: [f32; 3], radius: f32) -> Option<Self> {
         let space = Unit::of(&[line.origin, centre, [radius, 0.0, 0.0]]);
         let units = Units { space, ahead: Unit::of(&[line.direction]) };
-        let ([a, b, c], discriminant) = if is_short(2 * (space.bits + units.ahead.bits) + 7) {
-            let (abc, discriminant) = Self::polynomial::<i128>(units, line, centre, radius);
-            (abc.map(|x| x.to_integer()), discriminant.to_integer())
-        } else {
-            let (abc, discriminant) = Self::polynomial::<Fourth>(units, line, centre, radius);
-            (abc.map(|x| x.to_integer()), discriminant)
-        };
+        let bits = 2 * (space.bits + units.ahead.bits) + 7;
+        let ([a, b, c], discriminant) =
+            in_shortest!(bits, Fourth, polynomial(units, line, centre, radius));
         let (space, ahead) = (space.exponent, units.ahead.exponent);
         let is_met = discriminant.sign() != Ordering::Less;
         is_met.then_some(Roots { a, b, c, discriminant, space, ahead })
-    }
-
-    /// `a`, `b` and `c`, and the discriminant.
-    fn polynomial<N: Number>(
-        units: Units,
-        line: &Line,
-        centre: [f32; 3],
-        radius: f32,
-    ) -> ([N; 3], N) {
-        let d = units.ahead.vector::<N>(line.direction);
-        let from_centre = units.space.difference(line.origin, centre);
-        let r = units.space.count::<N>(radius);
-        let (a, b) = (dot(&d, &d), dot(&from_centre, &d));
-        let c = dot(&from_centre, &from_centre) - r * r;
-        ([a, b, c], b * b - a * c)
     }
 
     /// Whether both roots are one.
@@ -124,11 +105,8 @@ impl Root {
         let (up, down) = shifts(x.exponent - self.roots.exponent());
         let (n, d) = (x.dividend.bits() + up, x.divisor.bits());
         let (a, b, c) = (a.bits() + 2 * n, b.bits() + down + n + d, c.bits() + 2 * (down + d));
-        let [value, slope] = if is_short(a.max(b + 1).max(c) + 2) {
-            self.signs_at::<i128>(x, up, down)
-        } else {
-            self.signs_at::<Eighth>(x, up, down)
-        };
+        let bits = a.max(b + 1).max(c) + 2;
+        let [value, slope] = in_shortest!(bits, Eighth, signs_at(&self.roots, x, up, down));
         // Seen from the far root; the near one is its mirror image.
         let slope = if self.far { slope } else { slope.reverse() };
         let beyond = match (value, slope) {
@@ -138,14 +116,29 @@ impl Root {
         };
         if self.far { beyond } else { beyond.reverse() }
     }
+}
 
-    /// The signs of `a n^2 + 2 b n d + c d^2` and `a n + b d`.
-    fn signs_at<N: Number>(&self, x: &Quotient, up: u32, down: u32) -> [Ordering; 2] {
-        let (n, d) = (N::of(&x.dividend).shifted(up), N::of(&x.divisor));
-        let an = N::of(&self.roots.a) * n;
-        let bd = N::of(&self.roots.b).shifted(down) * d;
-        let cd = N::of(&self.roots.c).shifted(2 * down) * d;
-        let slope = an + bd;
-        [(slope + bd) * n + cd * d, slope].map(|x| x.sign())
-    }
+/// `a`, `b` and `c`, and the discriminant.
+fn polynomial<N: Number>(
+    units: Units,
+    line: &Line,
+    centre: [f32; 3],
+    radius: f32,
+) -> ([Second; 3], Fourth) {
+    let [o, m, [r, ..]] = units.space.count::<N, 3>([line.origin, centre, [radius, 0.0, 0.0]]);
+    let [d] = units.ahead.count([line.direction]);
+    let from_centre = minus(&o, &m);
+    let (a, b) = (dot(&d, &d), dot(&from_centre, &d));
+    let c = dot(&from_centre, &from_centre) - r * r;
+    ([a, b, c].map(|x| x.to_integer()), (b * b - a * c).to_integer())
+}
+
+/// The signs of `a n^2 + 2 b n d + c d^2` and `a n + b d`.
+fn signs_at<N: Number>(roots: &Roots, x: &Quotient, up: u32, down: u32) -> [Ordering; 2] {
+    let (n, d) = (N::of(&x.dividend).shifted(up), N::of(&x.divisor));
+    let an = N::of(&roots.a) * n;
+    let bd = N::of(&roots.b).shifted(down) * d;
+    let cd = N::of(&roots.c).shifted(2 * down) * d;
+    let slope = an + bd;
+    [(slope + bd) * n + cd * d, slope].map(|x| x.sign())
 }

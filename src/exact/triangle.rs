@@ -6,8 +6,9 @@
 
 use core::cmp::Ordering;
 
-use super::units::{Binary, Unit, Units, cross, dot, is_short};
+use super::units::{Unit, Units, cross, dot, in_shortest, minus};
 use super::{Line, Triangle};
+use crate::math::binary::Binary;
 use crate::math::float::power_of_two;
 use crate::math::integer::{Integer, Number};
 use crate::math::rounding::UNIT;
@@ -23,37 +24,44 @@ type Sixth = Integer<27>;
 /// Exact in sign; in size within `1.001 UNIT` of the real one.
 pub(crate) fn volumes(line: &Line, triangle: Triangle) -> [f64; 3] {
     let units = units(line, triangle);
-    let Units { space, ahead } = units;
-    let exponent = 2 * space.exponent + ahead.exponent;
-    if is_short(2 * space.bits + ahead.bits + 5) {
-        volumes_in::<i128>(units, line, triangle).map(|v| v.to_integer::<2>().approximate(exponent))
-    } else {
-        volumes_in::<Third>(units, line, triangle).map(|v| v.approximate(exponent))
-    }
+    let bits = 2 * units.space.bits + units.ahead.bits + 5;
+    in_shortest!(bits, Third, volumes_in(units, line, triangle))
 }
 
-fn volumes_in<N: Number>(units: Units, line: &Line, triangle: Triangle) -> [N; 3] {
-    let d = units.ahead.vector(line.direction);
-    let [a, b, c] = triangle.map(|p| units.space.difference::<N>(p, line.origin));
-    [(&c, &a), (&a, &b), (&b, &c)].map(|(p, q)| dot(&d, &cross(p, q)))
+fn volumes_in<N: Number>(units: Units, line: &Line, [a, b, c]: Triangle) -> [f64; 3] {
+    let [o, a, b, c] = units.space.count::<N, 4>([line.origin, a, b, c]);
+    let [d] = units.ahead.count([line.direction]);
+    let (a, b, c) = (minus(&a, &o), minus(&b, &o), minus(&c, &o));
+    let exponent = 2 * units.space.exponent + units.ahead.exponent;
+    [(&c, &a), (&a, &b), (&b, &c)]
+        .map(|(p, q)| dot(&d, &cross(p, q)).to_integer::<14>().approximate(exponent))
 }
 
 /// Whether the triangle has area.
 pub(crate) fn has_area(triangle: Triangle) -> bool {
     let unit = Unit::of(&triangle);
-    if is_short(2 * unit.bits + 3) {
-        normal::<i128>(unit, triangle).iter().any(|x| *x != 0)
-    } else {
-        normal::<Third>(unit, triangle).iter().any(|x| x.sign() != Ordering::Equal)
-    }
+    in_shortest!(2 * unit.bits + 3, Third, has_area_in(unit, triangle))
 }
 
-fn normal<N: Number>(unit: Unit, [a, b, c]: Triangle) -> [N; 3] {
-    cross(&unit.difference(b, a), &unit.difference(c, a))
+fn has_area_in<N: Number>(unit: Unit, triangle: Triangle) -> bool {
+    normal::<N>(&unit.count(triangle)).iter().any(|x| x.sign() != Ordering::Equal)
+}
+
+fn normal<N: Number>([a, b, c]: &[[N; 3]; 3]) -> [N; 3] {
+    cross(&minus(b, a), &minus(c, a))
 }
 
 fn units(line: &Line, [a, b, c]: Triangle) -> Units {
     Units { space: Unit::of(&[line.origin, a, b, c]), ahead: Unit::of(&[line.direction]) }
+}
+
+/// The dividend and the divisor of the `t` of a plane.
+fn parts<N: Number>(units: Units, line: &Line, [a, b, c]: Triangle) -> [Third; 2] {
+    let [o, a, b, c] = units.space.count::<N, 4>([line.origin, a, b, c]);
+    let [d] = units.ahead.count([line.direction]);
+    let to_plane = minus(&a, &o);
+    let n = normal(&[a, b, c]);
+    [dot(&to_plane, &n).to_integer(), dot(&d, &n).to_integer()]
 }
 
 /// The number `dividend / divisor * 2^exponent`, the divisor positive.
@@ -70,23 +78,13 @@ impl Quotient {
         let units = units(line, triangle);
         let Units { space, ahead } = units;
         let bits = 2 * space.bits + 5 + ahead.bits.max(space.bits + 1);
-        let [dividend, divisor] = if is_short(bits) {
-            Self::parts::<i128>(units, line, triangle).map(|x| x.to_integer())
-        } else {
-            Self::parts::<Third>(units, line, triangle)
-        };
+        let [dividend, divisor] = in_shortest!(bits, Third, parts(units, line, triangle));
         let exponent = units.of_t();
         match divisor.sign() {
             Ordering::Less => Some(Quotient { dividend: -dividend, divisor: -divisor, exponent }),
             Ordering::Equal => None,
             Ordering::Greater => Some(Quotient { dividend, divisor, exponent }),
         }
-    }
-
-    fn parts<N: Number>(units: Units, line: &Line, triangle: Triangle) -> [N; 2] {
-        let n = normal::<N>(units.space, triangle);
-        let to_plane = units.space.difference(triangle[0], line.origin);
-        [dot(&to_plane, &n), dot(&units.ahead.vector(line.direction), &n)]
     }
 
     /// A float, or the middle of two.
@@ -114,18 +112,15 @@ impl Quotient {
     pub fn compare(&self, other: &Quotient) -> Ordering {
         let (up, down) = shifts(self.exponent - other.exponent);
         let bits = |p: &Quotient, q: &Quotient, up| p.dividend.bits() + up + q.divisor.bits();
-        if is_short(bits(self, other, up).max(bits(other, self, down)) + 1) {
-            self.excess::<i128>(other, up, down).sign()
-        } else {
-            self.excess::<Sixth>(other, up, down).sign()
-        }
+        let bits = bits(self, other, up).max(bits(other, self, down)) + 1;
+        in_shortest!(bits, Sixth, order(self, other, up, down))
     }
+}
 
-    fn excess<N: Number>(&self, other: &Quotient, up: u32, down: u32) -> N {
-        let product =
-            |p: &Quotient, q: &Quotient, up| N::of(&p.dividend).shifted(up) * N::of(&q.divisor);
-        product(self, other, up) - product(other, self, down)
-    }
+fn order<N: Number>(p: &Quotient, q: &Quotient, up: u32, down: u32) -> Ordering {
+    let left = N::of(&p.dividend).shifted(up) * N::of(&q.divisor);
+    let right = N::of(&q.dividend).shifted(down) * N::of(&p.divisor);
+    (left - right).sign()
 }
 
 /// The shifts that bring two numbers to one unit, when the first one's is `2^apart` of the second's.

@@ -9,7 +9,7 @@ use core::cmp::Ordering;
 
 use super::sphere::{Eighth, Root, Second};
 use super::triangle::shifts;
-use super::units::is_short;
+use super::units::in_shortest;
 use crate::math::integer::{Integer, Number};
 
 /// Holds everything of sixteenth degree: 4469 bits.
@@ -35,11 +35,8 @@ impl Root {
         let d = (p.discriminant.bits() + 2 * up).max(q.discriminant.bits() + 2 * down);
         // The rest of `order` is a square of twice `b + 1` bits less two discriminants.
         let rest = (2 * b + 2).max(d + 1) + 1;
-        if is_short((2 * rest).max(2 * d + 2) + 1) {
-            order::<i128>(self.terms(up, None), other.terms(down, None))
-        } else {
-            order::<Eighth>(self.terms(up, None), other.terms(down, None))
-        }
+        let bits = (2 * rest).max(2 * d + 2) + 1;
+        in_shortest!(bits, Eighth, order_on_one_line(self, other, up, down))
     }
 
     /// The terms in a unit that is smaller by `2^shift`, times `factor`.
@@ -56,6 +53,10 @@ impl Root {
             Some(a) => Terms { b: b * a, discriminant: discriminant * a * a, sign },
         }
     }
+}
+
+fn order_on_one_line<N: Number>(p: &Root, q: &Root, up: u32, down: u32) -> Ordering {
+    order::<N>(p.terms(up, None), q.terms(down, None))
 }
 
 /// The sign of `B + s sqrt(D) - s' sqrt(D')`.

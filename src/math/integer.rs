@@ -3,6 +3,7 @@
 use core::cmp::Ordering;
 use core::ops::{Add, Mul, Neg, Sub};
 
+use super::binary::Binary;
 use super::float::power_of_two;
 
 /// A number system in which a formula is evaluated without error.
@@ -14,6 +15,9 @@ pub(crate) trait Number:
 {
     /// `mantissa * 2^shift`.
     fn scaled(mantissa: i32, shift: u32) -> Self;
+
+    /// The float `x`, a multiple of `2^unit`, as that multiple.
+    fn count(x: f32, unit: i32) -> Self;
 
     /// The same number.
     fn of<const WORDS: usize>(number: &Integer<WORDS>) -> Self;
@@ -144,16 +148,18 @@ impl<const WORDS: usize> Mul for Integer<WORDS> {
     fn mul(self, other: Self) -> Self {
         let mut words = [0; WORDS];
         for (i, x) in self.used().iter().enumerate() {
-            let mut carry = 0;
-            let mut places = words.iter_mut().skip(i);
-            // The factor comes first: when it ends, no place is taken from the row of places.
-            for (y, place) in other.used().iter().zip(&mut places) {
-                let sum = u128::from(*x) * u128::from(*y) + u128::from(*place) + carry;
-                *place = sum as u64;
-                carry = sum >> 64;
+            // Far exponents leave many words empty.
+            if *x == 0 {
+                continue;
             }
-            if let Some(place) = places.next() {
-                *place = carry as u64;
+            let mut carry = 0;
+            for (place, y) in words[i..].iter_mut().zip(other.used()) {
+                let sum = u128::from(*x) * u128::from(*y) + u128::from(*place) + u128::from(carry);
+                *place = sum as u64;
+                carry = (sum >> 64) as u64;
+            }
+            if let Some(place) = words.get_mut(i + other.length) {
+                *place = carry;
             }
         }
         let most = self.length + other.length;
@@ -170,6 +176,13 @@ impl<const WORDS: usize> Number for Integer<WORDS> {
             *word = part;
         }
         Self::trimmed(words, place + 2, mantissa < 0)
+    }
+
+    fn count(x: f32, unit: i32) -> Self {
+        let Binary { mantissa, exponent } = Binary::of(x);
+        let shift = exponent - unit;
+        // A unit larger than the mantissa's last place divides the mantissa.
+        Self::scaled(mantissa >> shift.min(0).unsigned_abs().min(31), shift.max(0) as u32)
     }
 
     fn of<const OTHER: usize>(number: &Integer<OTHER>) -> Self {
@@ -210,6 +223,16 @@ impl<const WORDS: usize> Number for Integer<WORDS> {
 impl Number for i128 {
     fn scaled(mantissa: i32, shift: u32) -> Self {
         i128::from(mantissa) << shift
+    }
+
+    fn count(x: f32, unit: i32) -> Self {
+        // What is short fits 64 bits and has no far exponents, but for that of zero.
+        let Binary { mantissa, exponent } = Binary::of(x);
+        let (mantissa, shift) = (i64::from(mantissa), exponent.wrapping_sub(unit));
+        let size = shift.unsigned_abs();
+        let count =
+            if shift < 0 { mantissa.wrapping_shr(size) } else { mantissa.wrapping_shl(size) };
+        i128::from(count)
     }
 
     fn of<const WORDS: usize>(number: &Integer<WORDS>) -> Self {

@@ -1,6 +1,7 @@
 //! Floats and boxes; nothing here knows of rays.
 
 pub(crate) mod aabb;
+pub(crate) mod binary;
 pub(crate) mod error_free;
 pub(crate) mod float;
 pub(crate) mod integer;
