@@ -125,9 +125,9 @@ fn polynomial<N: Number>(
     centre: [f32; 3],
     radius: f32,
 ) -> ([Second; 3], Fourth) {
-    let [o, m, [r, ..]] = units.space.count::<N, 3>([line.origin, centre, [radius, 0.0, 0.0]]);
-    let [d] = units.ahead.count([line.direction]);
-    let from_centre = minus(&o, &m);
+    let d = units.ahead.count::<N>(line.direction);
+    let from_centre = minus(&units.space.count(line.origin), &units.space.count(centre));
+    let r = N::count(radius, units.space.exponent);
     let (a, b) = (dot(&d, &d), dot(&from_centre, &d));
     let c = dot(&from_centre, &from_centre) - r * r;
     ([a, b, c].map(|x| x.to_integer()), (b * b - a * c).to_integer())

@@ -29,9 +29,9 @@ pub(crate) fn volumes(line: &Line, triangle: Triangle) -> [f64; 3] {
 }
 
 fn volumes_in<N: Number>(units: Units, line: &Line, [a, b, c]: Triangle) -> [f64; 3] {
-    let [o, a, b, c] = units.space.count::<N, 4>([line.origin, a, b, c]);
-    let [d] = units.ahead.count([line.direction]);
-    let (a, b, c) = (minus(&a, &o), minus(&b, &o), minus(&c, &o));
+    let (o, d) = (units.space.count::<N>(line.origin), units.ahead.count(line.direction));
+    let from_origin = |p| minus(&units.space.count(p), &o);
+    let (a, b, c) = (from_origin(a), from_origin(b), from_origin(c));
     let exponent = 2 * units.space.exponent + units.ahead.exponent;
     [(&c, &a), (&a, &b), (&b, &c)]
         .map(|(p, q)| dot(&d, &cross(p, q)).to_integer::<14>().approximate(exponent))
@@ -43,11 +43,12 @@ pub(crate) fn has_area(triangle: Triangle) -> bool {
     in_shortest!(2 * unit.bits + 3, Third, has_area_in(unit, triangle))
 }
 
-fn has_area_in<N: Number>(unit: Unit, triangle: Triangle) -> bool {
-    normal::<N>(&unit.count(triangle)).iter().any(|x| x.sign() != Ordering::Equal)
+fn has_area_in<N: Number>(unit: Unit, [a, b, c]: Triangle) -> bool {
+    let n = normal::<N>(&unit.count(a), &unit.count(b), &unit.count(c));
+    n.iter().any(|x| x.sign() != Ordering::Equal)
 }
 
-fn normal<N: Number>([a, b, c]: &[[N; 3]; 3]) -> [N; 3] {
+fn normal<N: Number>(a: &[N; 3], b: &[N; 3], c: &[N; 3]) -> [N; 3] {
     cross(&minus(b, a), &minus(c, a))
 }
 
@@ -57,10 +58,10 @@ fn units(line: &Line, [a, b, c]: Triangle) -> Units {
 
 /// The dividend and the divisor of the `t` of a plane.
 fn parts<N: Number>(units: Units, line: &Line, [a, b, c]: Triangle) -> [Third; 2] {
-    let [o, a, b, c] = units.space.count::<N, 4>([line.origin, a, b, c]);
-    let [d] = units.ahead.count([line.direction]);
+    let (o, d) = (units.space.count::<N>(line.origin), units.ahead.count(line.direction));
+    let (a, b, c) = (units.space.count(a), units.space.count(b), units.space.count(c));
     let to_plane = minus(&a, &o);
-    let n = normal(&[a, b, c]);
+    let n = normal(&a, &b, &c);
     [dot(&to_plane, &n).to_integer(), dot(&d, &n).to_integer()]
 }
 

@@ -17,7 +17,7 @@ impl Unit {
     pub fn of(points: &[[f32; 3]]) -> Self {
         let (mut lowest, mut largest) = (i32::MAX, 0);
         for x in points.as_flattened() {
-            lowest = lowest.min(Binary::of(*x).last_place());
+            lowest = lowest.min(Binary::last_place(*x));
             // The bits of floats are in the order of their sizes, NaN at the end.
             largest = largest.max(x.abs().to_bits());
         }
@@ -31,12 +31,11 @@ impl Unit {
         }
     }
 
-    /// The points in whole numbers of units.
-    pub fn count<N: Number, const POINTS: usize>(
-        self,
-        points: [[f32; 3]; POINTS],
-    ) -> [[N; 3]; POINTS] {
-        points.map(|point| point.map(|x| N::count(x, self.exponent)))
+    /// A point in whole numbers of units.
+    #[inline]
+    pub fn count<N: Number>(self, [x, y, z]: [f32; 3]) -> [N; 3] {
+        let count = |x| N::count(x, self.exponent);
+        [count(x), count(y), count(z)]
     }
 }
 

@@ -30,11 +30,14 @@ impl Binary {
         Binary { mantissa: mantissa(x) + mantissa(y), exponent: exponent - 1 }
     }
 
-    /// The largest exponent with which the mantissa is still whole; of zero, the largest number.
-    pub fn last_place(self) -> i32 {
-        match self.mantissa {
-            0 => i32::MAX,
-            mantissa => self.exponent + mantissa.trailing_zeros() as i32,
-        }
+    /// The exponent of the last bit of `x` that is set; of zero, the largest number.
+    #[inline]
+    pub fn last_place(x: f32) -> i32 {
+        let bits = x.to_bits();
+        let field = (bits >> 23 & 0xff) as i32;
+        // Above the bits of the mantissa stands the hidden one, or for the least exponent one that
+        // is only seen when the mantissa is zero.
+        let zeros = (bits & 0x7f_ffff | 0x80_0000).trailing_zeros() as i32;
+        if x == 0.0 { i32::MAX } else { field.max(1) - 150 + zeros }
     }
 }
