@@ -41,3 +41,36 @@ impl Binary {
         if x == 0.0 { i32::MAX } else { field.max(1) - 150 + zeros }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn value(x: Binary) -> f64 {
+        f64::from(x.mantissa) * 2f64.powi(x.exponent)
+    }
+
+    #[test]
+    fn parts_make_the_float() {
+        for x in [0.0, 1.0, -1.5, 1e-45, -f32::MIN_POSITIVE, f32::MAX, 0.1] {
+            assert_eq!(value(Binary::of(x)), f64::from(x));
+            if x != 0.0 {
+                let odd = f64::from(x) / 2f64.powi(Binary::last_place(x));
+                assert_eq!(odd.rem_euclid(2.0), 1.0, "{x}");
+            }
+        }
+        assert_eq!(value(Binary::of(f32::NEG_INFINITY)), -(2f64.powi(128)));
+        assert_eq!(Binary::last_place(-0.0), i32::MAX);
+    }
+
+    #[test]
+    fn middles_lie_between_neighbours() {
+        for x in [0.0, 1.0, -1.0, 1e-45, -1e-45, f32::MIN_POSITIVE.next_down(), 1f32.next_down()] {
+            let middle = (f64::from(x) + f64::from(x.next_up())) / 2.0;
+            assert_eq!(value(Binary::middle_above(x)), middle, "{x}");
+        }
+        let end = 2f64.powi(128) - 2f64.powi(103);
+        assert_eq!(value(Binary::middle_above(f32::MAX)), end);
+        assert_eq!(value(Binary::middle_above(f32::NEG_INFINITY)), -end);
+    }
+}

@@ -13,9 +13,6 @@ use super::float::power_of_two;
 pub(crate) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// `mantissa * 2^shift`.
-    fn scaled(mantissa: i32, shift: u32) -> Self;
-
     /// The float `x`, a multiple of `2^unit`, as that multiple.
     fn count(x: f32, unit: i32) -> Self;
 
@@ -46,6 +43,17 @@ pub(crate) struct Integer<const WORDS: usize> {
 }
 
 impl<const WORDS: usize> Integer<WORDS> {
+    /// `mantissa * 2^shift`.
+    pub fn scaled(mantissa: i32, shift: u32) -> Self {
+        let size = u128::from(mantissa.unsigned_abs()) << (shift % 64);
+        let mut words = [0; WORDS];
+        let place = shift as usize / 64;
+        for (word, part) in words.iter_mut().skip(place).zip([size as u64, (size >> 64) as u64]) {
+            *word = part;
+        }
+        Self::trimmed(words, place + 2, mantissa < 0)
+    }
+
     /// The number of bits of the size: zero for zero.
     pub fn bits(&self) -> u32 {
         match self.used() {
@@ -68,6 +76,20 @@ impl<const WORDS: usize> Integer<WORDS> {
         let scale = exponent + 64 * (self.length as i32 - 1) - spare as i32;
         let size = top as f64 * power_of_two(scale);
         if self.negative { -size } else { size }
+    }
+
+    /// The number times `2^by`.
+    fn moved(&self, by: u32) -> Self {
+        let (place, by) = (by as usize / 64, by % 64);
+        let mut words = [0; WORDS];
+        let mut carry = 0;
+        // One word beyond those in use takes the last carry.
+        for (word, x) in words.iter_mut().skip(place).zip(self.used().iter().chain([&0])) {
+            let wide = u128::from(*x) << by;
+            *word = wide as u64 | carry;
+            carry = (wide >> 64) as u64;
+        }
+        Self::trimmed(words, place + self.length + 1, self.negative)
     }
 
     fn used(&self) -> &[u64] {
@@ -168,16 +190,6 @@ impl<const WORDS: usize> Mul for Integer<WORDS> {
 }
 
 impl<const WORDS: usize> Number for Integer<WORDS> {
-    fn scaled(mantissa: i32, shift: u32) -> Self {
-        let size = u128::from(mantissa.unsigned_abs()) << (shift % 64);
-        let mut words = [0; WORDS];
-        let place = shift as usize / 64;
-        for (word, part) in words.iter_mut().skip(place).zip([size as u64, (size >> 64) as u64]) {
-            *word = part;
-        }
-        Self::trimmed(words, place + 2, mantissa < 0)
-    }
-
     fn count(x: f32, unit: i32) -> Self {
         let Binary { mantissa, exponent } = Binary::of(x);
         let shift = exponent - unit;
@@ -195,20 +207,9 @@ impl<const WORDS: usize> Number for Integer<WORDS> {
         Integer::of(&self)
     }
 
+    #[inline]
     fn shifted(self, by: u32) -> Self {
-        if by == 0 {
-            return self;
-        }
-        let (place, by) = (by as usize / 64, by % 64);
-        let mut words = [0; WORDS];
-        let mut carry = 0;
-        // One word beyond those in use takes the last carry.
-        for (word, x) in words.iter_mut().skip(place).zip(self.used().iter().chain([&0])) {
-            let wide = u128::from(*x) << by;
-            *word = wide as u64 | carry;
-            carry = (wide >> 64) as u64;
-        }
-        Self::trimmed(words, place + self.length + 1, self.negative)
+        if by == 0 { self } else { self.moved(by) }
     }
 
     fn sign(&self) -> Ordering {
@@ -221,10 +222,6 @@ impl<const WORDS: usize> Number for Integer<WORDS> {
 }
 
 impl Number for i128 {
-    fn scaled(mantissa: i32, shift: u32) -> Self {
-        i128::from(mantissa) << shift
-    }
-
     fn count(x: f32, unit: i32) -> Self {
         // What is short fits 64 bits and has no far exponents, but for that of zero.
         let Binary { mantissa, exponent } = Binary::of(x);
@@ -255,5 +252,102 @@ impl Number for i128 {
 
     fn sign(&self) -> Ordering {
         self.cmp(&0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use raykern_harness::make::Random;
+
+    type Number5 = Integer<5>;
+
+    fn whole(x: i128) -> Number5 {
+        x.to_integer()
+    }
+
+    fn power(n: u32) -> Number5 {
+        Number5::scaled(1, n)
+    }
+
+    fn is(p: Number5, q: Number5) -> bool {
+        (p - q).sign() == Ordering::Equal && (q - p).sign() == Ordering::Equal
+    }
+
+    #[test]
+    fn carries_and_borrows_run_through_all_words() {
+        let one = whole(1);
+        for n in [1, 63, 64, 65, 127, 128, 200, 256] {
+            let ones = power(n) - one;
+            assert_eq!((ones.bits(), power(n).bits()), (n, n + 1));
+            assert!(is(ones + one, power(n)));
+            assert!(is(one - power(n), -ones));
+            assert!(is(-one + power(n), ones));
+            assert_eq!((ones - ones).bits(), 0);
+            assert_eq!((-ones).sign(), Ordering::Less);
+            assert_eq!((-(ones - ones)).sign(), Ordering::Equal);
+        }
+        for n in [31, 32, 64, 100, 128] {
+            // (2^n - 1)^2 = 2^2n - 2^(n + 1) + 1: all carries at once.
+            let ones = power(n) - one;
+            assert!(is(ones * ones, power(2 * n) - power(n + 1) + one));
+            assert!(is(ones * -ones, power(n + 1) - power(2 * n) - one));
+        }
+    }
+
+    #[test]
+    fn empty_words_between_full_ones_are_kept() {
+        let sparse = power(256) + whole(3);
+        assert!(is(sparse * whole(-5), -power(258) - power(256) - whole(15)));
+        assert!(is((power(128) + whole(1)) * (power(128) - whole(1)), power(256) - whole(1)));
+        assert!(is(sparse - power(256), whole(3)));
+        assert_eq!((power(192) - sparse).sign(), Ordering::Less);
+    }
+
+    #[test]
+    fn small_numbers_are_those_of_i128() {
+        let mut random = Random::new(1);
+        for round in 0..20_000 {
+            let mut number = || (random.bits() as i64 >> random.below(64)) as i128;
+            let (x, y) = (number(), number());
+            let (p, q) = (whole(x), whole(y));
+            assert!(is(p + q, whole(x + y)), "{round}: {x} {y}");
+            assert!(is(p - q, whole(x - y)), "{round}: {x} {y}");
+            assert!(is(p * q, whole(x * y)), "{round}: {x} {y}");
+            assert_eq!((p - q).sign(), x.cmp(&y), "{round}: {x} {y}");
+            assert_eq!(i128::of(&(p * q)), x * y, "{round}: {x} {y}");
+            let by = random.below(190) as u32;
+            assert!(is(p.shifted(by), p * power(by)), "{round}: {x} << {by}");
+            assert_eq!(p.approximate(0), x as f64, "{round}: {x}");
+        }
+    }
+
+    #[test]
+    fn sizes_are_close_at_every_length() {
+        let third = f64::from(u32::MAX / 3);
+        for n in 0..250 {
+            let number = whole(i128::from(u32::MAX / 3)).shifted(n);
+            assert_eq!(number.approximate(-(n as i32)), third);
+            assert_eq!((-number).approximate(-(n as i32) - 40), -third / 2f64.powi(40));
+        }
+        // What is cut off is worth less than a thousandth of a unit.
+        let near = power(200) + power(200 - 53) - whole(1);
+        let t = near.approximate(-200);
+        assert!((1.0..=1.0 + f64::EPSILON).contains(&t), "{t:e}");
+        assert_eq!(Number5::scaled(0, 9).approximate(5), 0.0);
+    }
+
+    #[test]
+    fn floats_are_counted_in_both_numbers_alike() {
+        for x in [1.0, -3.0, 0.0, -0.0, 1e-45, 0.75, 12_582_912.0, f32::MIN_POSITIVE] {
+            let unit = if x == 0.0 { 100 } else { Binary::last_place(x) };
+            let (long, short) = (Number5::count(x, unit), i128::count(x, unit));
+            assert_eq!(short & 1, i128::from(x != 0.0), "{x}");
+            assert!(is(long, whole(short)), "{x}");
+            let finer = (Number5::count(x, unit - 30), i128::count(x, unit - 30));
+            assert!(is(finer.0, whole(finer.1)) && finer.1 == short << 30, "{x}");
+        }
+        assert_eq!(Number5::count(f32::MAX, -149).bits(), 277);
+        assert_eq!(Number5::count(f32::INFINITY, -149).bits(), 278);
     }
 }
