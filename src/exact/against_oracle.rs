@@ -129,7 +129,11 @@ struct Case {
 
 impl Case {
     /// Shapes of such numbers. Some are like others but for one number, which is the next float.
-    fn new(r: &mut Random, number: &impl Fn(&mut Random) -> f32) -> Self {
+    fn new(
+        r: &mut Random,
+        number: &impl Fn(&mut Random) -> f32,
+        step: &impl Fn(&mut Random) -> f32,
+    ) -> Self {
         let point = |r: &mut Random| [0, 1, 2].map(|_| number(r));
         let nudge = |x: &mut f32| *x = if x.next_up().is_finite() { x.next_up() } else { 1.0 };
         let mut triangles: Vec<_> = (0..3).map(|_| [point(r), point(r), point(r)]).collect();
@@ -148,7 +152,8 @@ impl Case {
         // Any direction, and one towards a sphere.
         let (origin, to) = (point(r), balls[0].0);
         let towards = [0, 1, 2].map(|k| to[k] / 2.0 - origin[k] / 2.0);
-        let lines = [point(r), towards].map(|d| {
+        let ahead = [0, 1, 2].map(|_| step(r));
+        let lines = [ahead, towards].map(|d| {
             let direction = if d == [0.0; 3] { [1.0, 0.0, 0.0] } else { d };
             Line { origin, direction }
         });
@@ -165,10 +170,20 @@ impl Case {
 
 /// Judges cases of such numbers.
 fn judge_family(name: &str, rounds: u64, number: impl Fn(&mut Random) -> f32) -> Seen {
+    judge_mixed(name, rounds, &number, &number)
+}
+
+/// Judges cases of which the points and half of the directions are made of different numbers.
+fn judge_mixed(
+    name: &str,
+    rounds: u64,
+    number: &impl Fn(&mut Random) -> f32,
+    step: &impl Fn(&mut Random) -> f32,
+) -> Seen {
     let mut seen = Seen::default();
     for round in 0..rounds {
         let mut random = Random::new(round);
-        let case = Case::new(&mut random, &number);
+        let case = Case::new(&mut random, number, step);
         let limits = [number(&mut random), 0.0, f32::MAX, f32::from_bits(1)];
         let seed = std::format!("{name}, seed {round}");
         judge(&mut seen, &case.lines, &case.meetings(), &limits, &seed);
@@ -208,7 +223,21 @@ fn lattices_of_both_ends_at_once() {
 #[test]
 fn floats_of_every_exponent() {
     for range in [[-149.0, 127.9], [-149.0, -120.0], [100.0, 127.9], [-3.0, 0.0], [-30.0, 30.0]] {
-        let seen = judge_family(&std::format!("2^{range:?}"), 500, |r| wild(r, range));
+        let seen = judge_family(&std::format!("2^{range:?}"), 200, |r| wild(r, range));
+        assert!(seen.pairs > 20_000, "{seen:?}");
+    }
+}
+
+/// Units are chosen for points and for directions by themselves.
+#[test]
+fn long_directions_among_short_points() {
+    let ranges = [[-60.0, 0.0], [-30.0, 30.0], [-90.0, 10.0], [-149.0, 127.9]];
+    let lattice = |r: &mut Random| r.below(5) as f32 - 2.0;
+    for range in ranges {
+        let any = |r: &mut Random| wild(r, range);
+        let seen = judge_mixed(&std::format!("steps in 2^{range:?}"), 200, &lattice, &any);
+        assert!(seen.ties > 300, "{seen:?}");
+        let seen = judge_mixed(&std::format!("points in 2^{range:?}"), 200, &any, &lattice);
         assert!(seen.pairs > 20_000, "{seen:?}");
     }
 }

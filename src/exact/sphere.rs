@@ -13,11 +13,11 @@ use crate::math::float::sqrt;
 use crate::math::integer::{Integer, Number};
 use crate::math::rounding::UNIT;
 
-/// Holds everything of second degree: 562 bits.
+/// Holds everything of second degree: 560 bits.
 pub(super) type Second = Integer<9>;
 /// Holds everything of fourth degree: 1119 bits.
 type Fourth = Integer<18>;
-/// Holds everything of eighth degree: 2239 bits.
+/// Holds everything of eighth degree: 2243 bits.
 pub(super) type Eighth = Integer<36>;
 
 /// The two roots: where a line enters and leaves a sphere.
@@ -38,9 +38,8 @@ impl Roots {
     pub fn new(line: &Line, centre: [f32; 3], radius: f32) -> Option<Self> {
         let space = Unit::of(&[line.origin, centre, [radius, 0.0, 0.0]]);
         let units = Units { space, ahead: Unit::of(&[line.direction]) };
-        let bits = 2 * (space.bits + units.ahead.bits) + 7;
         let ([a, b, c], discriminant) =
-            in_shortest!(bits, Fourth, polynomial(units, line, centre, radius));
+            in_shortest!(units.bits(2, 2, 7), Fourth, polynomial(units, line, centre, radius));
         let (space, ahead) = (space.exponent, units.ahead.exponent);
         let is_met = discriminant.sign() != Ordering::Less;
         is_met.then_some(Roots { a, b, c, discriminant, space, ahead })
@@ -66,7 +65,7 @@ impl Roots {
     /// The larger one comes from the formula, in which nothing cancels, the smaller one from their
     /// product. `a`, `b`, `c` and the discriminant are off by `1.001 UNIT` each; the square root by half of
     /// that and a rounding, the sum by `2.51 UNIT`, either root by `4.52 UNIT`. They are taken in their
-    /// real size, between 2^-596 and 2^530, and their quotients lie between 2^-858 and 2^558.
+    /// real size, between 2^-596 and 2^530, and their quotients lie between 2^-558 and 2^558.
     pub fn approximate(&self) -> [(f64, f64); 2] {
         let (a, c) = (self.a.approximate(2 * self.ahead), self.c.approximate(2 * self.space));
         let b = self.b.approximate(self.space + self.ahead);

@@ -24,8 +24,7 @@ type Sixth = Integer<27>;
 /// Exact in sign; in size within `1.001 UNIT` of the real one.
 pub(crate) fn volumes(line: &Line, triangle: Triangle) -> [f64; 3] {
     let units = units(line, triangle);
-    let bits = 2 * units.space.bits + units.ahead.bits + 5;
-    in_shortest!(bits, Third, volumes_in(units, line, triangle))
+    in_shortest!(units.bits(2, 1, 5), Third, volumes_in(units, line, triangle))
 }
 
 fn volumes_in<N: Number>(units: Units, line: &Line, [a, b, c]: Triangle) -> [f64; 3] {
@@ -77,8 +76,7 @@ impl Quotient {
     /// The `t` at which the line meets the plane of a triangle; `None` when it is parallel to it.
     pub fn new(line: &Line, triangle: Triangle) -> Option<Self> {
         let units = units(line, triangle);
-        let Units { space, ahead } = units;
-        let bits = 2 * space.bits + 5 + ahead.bits.max(space.bits + 1);
+        let bits = units.bits(2, 1, 5).max(units.bits(3, 0, 6));
         let [dividend, divisor] = in_shortest!(bits, Third, parts(units, line, triangle));
         let exponent = units.of_t();
         match divisor.sign() {

@@ -12,7 +12,7 @@ use super::triangle::shifts;
 use super::units::in_shortest;
 use crate::math::integer::{Integer, Number};
 
-/// Holds everything of sixteenth degree: 4469 bits.
+/// Holds everything of sixteenth degree: 4475 bits.
 type Sixteenth = Integer<70>;
 
 /// A root, or a root times a positive number: `sign sqrt(discriminant) - b`.

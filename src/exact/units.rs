@@ -48,6 +48,13 @@ pub(super) struct Units {
 }
 
 impl Units {
+    /// The bits of what is below `2^(space s + ahead d + more)`, and at least twice those of a coordinate,
+    /// so that what is said to fit `i128` can be counted in half of it.
+    pub fn bits(self, space: u32, ahead: u32, more: u32) -> u32 {
+        let (s, d) = (self.space.bits, self.ahead.bits);
+        (space * s + ahead * d + more).max(2 * s).max(2 * d)
+    }
+
     /// The exponent of the unit of `t`.
     pub fn of_t(self) -> i32 {
         self.space.exponent - self.ahead.exponent

@@ -13,7 +13,7 @@ use super::float::power_of_two;
 pub(crate) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
-    /// The float `x`, a multiple of `2^unit`, as that multiple.
+    /// The float `x`, a multiple of `2^unit`, as that multiple; for `i128` it is below `2^63` in size.
     fn count(x: f32, unit: i32) -> Self;
 
     /// The same number.
@@ -223,13 +223,11 @@ impl<const WORDS: usize> Number for Integer<WORDS> {
 
 impl Number for i128 {
     fn count(x: f32, unit: i32) -> Self {
-        // What is short fits 64 bits and has no far exponents, but for that of zero.
+        // The exponent of zero alone may be far away, and zero may be shifted by anything.
         let Binary { mantissa, exponent } = Binary::of(x);
-        let (mantissa, shift) = (i64::from(mantissa), exponent.wrapping_sub(unit));
-        let size = shift.unsigned_abs();
-        let count =
-            if shift < 0 { mantissa.wrapping_shr(size) } else { mantissa.wrapping_shl(size) };
-        i128::from(count)
+        let (mantissa, shift) = (i64::from(mantissa), exponent - unit);
+        let by = shift.unsigned_abs();
+        i128::from(if shift < 0 { mantissa.wrapping_shr(by) } else { mantissa.wrapping_shl(by) })
     }
 
     fn of<const WORDS: usize>(number: &Integer<WORDS>) -> Self {

@@ -1,4 +1,4 @@
-//! Floats and boxes; nothing here knows of rays.
+//! Floats, integers and boxes; nothing here knows of rays.
 
 pub(crate) mod aabb;
 pub(crate) mod binary;
