@@ -71,7 +71,6 @@ impl Meeting {
 
 /// The real `t` of a meeting. Below 512 bytes; comparing two costs less than making one.
 #[derive(Clone, Copy, Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is no allocator to make them equal")]
 pub(crate) enum Distance {
     Quotient(Quotient),
     Root(Root),
