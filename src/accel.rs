@@ -173,9 +173,7 @@ impl<'m> Accel<'m> {
     /// primitive.
     ///
     /// Hit or miss, the primitive and the order are those of real arithmetic on the given floats,
-    /// and `t` is the nearest float to the real one. In this version one case is open: the order of
-    /// a sphere and another surface that meet the ray within about 1e-15 of each other, when some
-    /// coordinate is smaller than 2^-110, though not zero, or larger than 2^120.
+    /// and `t` is the nearest float to the real one, for all finite inputs.
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.intersect_with(ray, &QueryOptions::default())
     }

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 
-use crate::exact::Line;
 use crate::interval::{sphere, triangle};
 use crate::math::rounding::{UNIT, f32_above, f32_below};
 use crate::math::wide;
@@ -25,8 +24,7 @@ pub struct Surface {
 
 /// The surface of a triangle where the ray meets it.
 pub(crate) fn of_triangle(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Surface {
-    let line = Line { origin: ray.given.origin, direction: ray.given.direction };
-    let [u, v] = triangle::weights(&line, corners);
+    let [u, v] = triangle::weights(&ray.line(), corners);
     let [a, b, c] = corners.map(wide);
     // Whatever the error of the weights, the point lies in the plane.
     let point = a + u * (b - a) + v * (c - a);

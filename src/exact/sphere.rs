@@ -1,37 +1,48 @@
-//! A ray and a sphere in real arithmetic.
+//! A line and a sphere in real arithmetic.
 //!
-//! `t` is a root of `a t^2 + 2 b t + c` with `a = d . d`, `b = (o - c) . d`, `c = |o - c|^2 - r^2`, each of second
-//! degree in the given floats.
+//! `t` is a root of `a t^2 + 2 b t + c` with `a = d . d`, `b = (o - m) . d`, `c = |o - m|^2 - r^2`, each of second
+//! degree in the given floats. With points of `s` bits and a direction of `d`: `a < 2^(2 d + 2)`,
+//! `|b| < 2^(s + d + 3)`, `|c| < 2^(2 s + 4)`, and the discriminant `b^2 - a c` stays below `2^(2 s + 2 d + 7)`.
 
 use core::cmp::Ordering;
 
-use super::triangle::Quotient;
-use super::{Line, difference, dot, given};
-use crate::math::expansion::Expansion;
+use super::Line;
+use super::triangle::{Quotient, shifts};
+use super::units::{Unit, Units, dot, in_shortest, minus};
 use crate::math::float::sqrt;
+use crate::math::integer::{Integer, Number};
 use crate::math::rounding::UNIT;
 
-/// The two roots: where a ray's line enters and leaves a sphere.
-#[derive(Clone, Copy)]
+/// Holds everything of second degree: 560 bits.
+pub(super) type Second = Integer<9>;
+/// Holds everything of fourth degree: 1119 bits.
+type Fourth = Integer<18>;
+/// Holds everything of eighth degree: 2243 bits.
+pub(super) type Eighth = Integer<36>;
+
+/// The two roots: where a line enters and leaves a sphere.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Roots {
-    a: Expansion,
-    b: Expansion,
-    c: Expansion,
+    pub(super) a: Second,
+    pub(super) b: Second,
+    pub(super) c: Second,
     /// `b^2 - a c`, not negative.
-    discriminant: Expansion,
+    pub(super) discriminant: Fourth,
+    /// The exponents of the units of space and of the direction.
+    space: i32,
+    ahead: i32,
 }
 
 impl Roots {
     /// The roots, or `None` when the line misses the sphere.
-    pub fn new(ray: &Line, centre: [f32; 3], radius: f32) -> Option<Self> {
-        let (o, d) = given(ray);
-        let from_centre = difference(o, centre);
-        let (a, b) = (dot(&d, &d), dot(&from_centre, &d));
-        let r = Expansion::difference(f64::from(radius), 0.0);
-        let mut c = dot(&from_centre, &from_centre);
-        c.add_product(&r, &r.negated());
-        let discriminant = Expansion::cross(&b, &b, &a, &c);
-        (discriminant.sign() != Ordering::Less).then_some(Roots { a, b, c, discriminant })
+    pub fn new(line: &Line, centre: [f32; 3], radius: f32) -> Option<Self> {
+        let space = Unit::of(&[line.origin, centre, [radius, 0.0, 0.0]]);
+        let units = Units { space, ahead: Unit::of(&[line.direction]) };
+        let ([a, b, c], discriminant) =
+            in_shortest!(units.bits(2, 2, 7), Fourth, polynomial(units, line, centre, radius));
+        let (space, ahead) = (space.exponent, units.ahead.exponent);
+        let is_met = discriminant.sign() != Ordering::Less;
+        is_met.then_some(Roots { a, b, c, discriminant, space, ahead })
     }
 
     /// Whether both roots are one.
@@ -44,22 +55,34 @@ impl Roots {
         usize::from(self.b.sign() == Ordering::Greater)
     }
 
-    /// Both roots in `f64`, and bounds on their errors. The larger one comes from the formula, in
-    /// which nothing cancels, the smaller one from their product.
+    /// The exponent of the unit of `t`.
+    pub fn exponent(&self) -> i32 {
+        self.space - self.ahead
+    }
+
+    /// Both roots in `f64`, and bounds on their errors.
+    ///
+    /// The larger one comes from the formula, in which nothing cancels, the smaller one from their
+    /// product. `a`, `b`, `c` and the discriminant are off by `1.001 UNIT` each; the square root by half of
+    /// that and a rounding, the sum by `2.51 UNIT`, either root by `4.52 UNIT`. They are taken in their
+    /// real size, between 2^-596 and 2^530, and their quotients lie between 2^-558 and 2^558.
     pub fn approximate(&self) -> [(f64, f64); 2] {
-        let (a, b, c) = (self.a.approximate(), self.b.approximate(), self.c.approximate());
-        let q = -(b + sqrt(self.discriminant.approximate()).copysign(b));
+        let (a, c) = (self.a.approximate(2 * self.ahead), self.c.approximate(2 * self.space));
+        let b = self.b.approximate(self.space + self.ahead);
+        let root = sqrt(self.discriminant.approximate(2 * (self.space + self.ahead)));
+        let q = -(b + root.copysign(b));
         let (large, small) = if q == 0.0 { (0.0, 0.0) } else { (q / a, c / q) };
         // Without a product there is one root twice, or one of them is zero.
         let small = if self.touch() { large } else { small };
-        [large.min(small), large.max(small)].map(|t| (t, 16.0 * UNIT * t.abs()))
+        [large.min(small), large.max(small)].map(|t| (t, 5.0 * UNIT * t.abs()))
     }
 }
 
 /// One of two roots.
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Root {
-    roots: Roots,
-    far: bool,
+    pub roots: Roots,
+    pub far: bool,
 }
 
 impl Root {
@@ -71,9 +94,18 @@ impl Root {
         self.roots.approximate()[usize::from(self.far)]
     }
 
-    /// The order against a number at which the polynomial has the sign `value`, and half its
-    /// derivative the sign `slope`.
-    fn compare_by(&self, value: Ordering, slope: Ordering) -> Ordering {
+    /// The order against the distance of a plane, eighth degree, or a float, fourth degree.
+    ///
+    /// `x = n / d 2^k` in the unit of the roots lies beyond the far one exactly when `a x^2 + 2 b x + c` and half
+    /// its derivative, `a x + b`, are positive. Both are multiplied by powers of `d`, which is, and
+    /// of two, so that no exponent is negative: `n` is shifted, or `b` once and `c` twice.
+    pub fn compare_with(&self, x: &Quotient) -> Ordering {
+        let Roots { a, b, c, .. } = &self.roots;
+        let (up, down) = shifts(x.exponent - self.roots.exponent());
+        let (n, d) = (x.dividend.bits() + up, x.divisor.bits());
+        let (a, b, c) = (a.bits() + 2 * n, b.bits() + down + n + d, c.bits() + 2 * (down + d));
+        let bits = a.max(b + 1).max(c) + 2;
+        let [value, slope] = in_shortest!(bits, Eighth, signs_at(&self.roots, x, up, down));
         // Seen from the far root; the near one is its mirror image.
         let slope = if self.far { slope } else { slope.reverse() };
         let beyond = match (value, slope) {
@@ -83,91 +115,29 @@ impl Root {
         };
         if self.far { beyond } else { beyond.reverse() }
     }
+}
 
-    /// The order against a float of at most 48 bits: fourth degree.
-    pub fn compare_with(&self, x: f64) -> Ordering {
-        let one = Expansion::difference(1.0, 0.0);
-        self.compare_with_ratio(&Expansion::difference(x, 0.0), &one)
-    }
+/// `a`, `b` and `c`, and the discriminant.
+fn polynomial<N: Number>(
+    units: Units,
+    line: &Line,
+    centre: [f32; 3],
+    radius: f32,
+) -> ([Second; 3], Fourth) {
+    let d = units.ahead.count::<N>(line.direction);
+    let from_centre = minus(&units.space.count(line.origin), &units.space.count(centre));
+    let r = N::count(radius, units.space.exponent);
+    let (a, b) = (dot(&d, &d), dot(&from_centre, &d));
+    let c = dot(&from_centre, &from_centre) - r * r;
+    ([a, b, c].map(|x| x.to_integer()), (b * b - a * c).to_integer())
+}
 
-    /// The order against the distance of a plane: eighth degree.
-    pub fn compare_with_quotient(&self, other: &Quotient) -> Ordering {
-        self.compare_with_ratio(&other.dividend, &other.divisor)
-    }
-
-    /// The order against `n / d`, `d` positive: the signs of `a n^2 + 2 b n d + c d^2` and `a n + b d`.
-    fn compare_with_ratio(&self, n: &Expansion, d: &Expansion) -> Ordering {
-        let Roots { a, b, c, .. } = &self.roots;
-        let mut slope = Expansion::ZERO;
-        slope.add_product(a, n);
-        slope.add_product(b, d);
-        let (mut bd, mut cd) = (slope, Expansion::ZERO);
-        bd.add_product(b, d);
-        cd.add_product(c, d);
-        let mut value = Expansion::ZERO;
-        value.add_product(&bd, n);
-        value.add_product(&cd, d);
-        self.compare_by(value.sign(), slope.sign())
-    }
-
-    /// The order of two roots on one ray, which have `a` in common.
-    ///
-    /// That is the sign of `B + s sqrt(D) - s' sqrt(D')` with `B = b' - b`. Signs of sums with square roots
-    /// follow from signs of squares, twice; the last is of eighth degree.
-    pub fn compare(&self, other: &Root) -> Ordering {
-        let sign = |root: &Root| if root.far { Ordering::Greater } else { Ordering::Less };
-        let (p, q) = (&self.roots.discriminant, &other.roots.discriminant);
-        let mut shift = other.roots.b;
-        shift.add_all(&self.roots.b.negated());
-        // The sign of s sqrt(D) - s' sqrt(D').
-        let mut wider = *p;
-        wider.add_all(&q.negated());
-        let (s, t) = (self.signed(sign(self)), other.signed(sign(other)));
-        let roots = match (s, t) {
-            (s, t) if s != t => s.cmp(&t),
-            (Ordering::Greater, _) => wider.sign(),
-            (Ordering::Less, _) => wider.sign().reverse(),
-            _ => Ordering::Equal,
-        };
-        match (shift.sign(), roots) {
-            (b, Ordering::Equal) => b,
-            (Ordering::Equal, r) => r,
-            (b, r) if b == r => b,
-            // Of different signs: the larger square wins.
-            (b, r) => match self.compare_squares(other, &shift, s == t) {
-                Ordering::Greater => b,
-                Ordering::Less => r,
-                Ordering::Equal => Ordering::Equal,
-            },
-        }
-    }
-
-    /// The sign of the root's square-root term: zero when the roots are one.
-    fn signed(&self, sign: Ordering) -> Ordering {
-        if self.roots.touch() { Ordering::Equal } else { sign }
-    }
-
-    /// The order of `B^2` and `(s sqrt(D) - s' sqrt(D'))^2`: the sign of `B^2 - D - D' +- 2 sqrt(D D')`.
-    fn compare_squares(&self, other: &Root, shift: &Expansion, same: bool) -> Ordering {
-        let (p, q) = (&self.roots.discriminant, &other.roots.discriminant);
-        let mut rest = Expansion::ZERO;
-        rest.add_product(shift, shift);
-        rest.add_all(&p.negated());
-        rest.add_all(&q.negated());
-        let mixed = if same { Ordering::Greater } else { Ordering::Less };
-        let mixed = if self.roots.touch() || other.roots.touch() { Ordering::Equal } else { mixed };
-        match (rest.sign(), mixed) {
-            (r, Ordering::Equal) => r,
-            (Ordering::Equal, m) => m,
-            (r, m) if r == m => r,
-            (r, m) => {
-                let four_p = p.scaled(4.0);
-                match Expansion::cross(&rest, &rest, &four_p, q).sign() {
-                    Ordering::Greater => r,
-                    Ordering::Less => m,
-                    Ordering::Equal => Ordering::Equal,
-                }
-            }
-        }
-    }
+/// The signs of `a n^2 + 2 b n d + c d^2` and `a n + b d`.
+fn signs_at<N: Number>(roots: &Roots, x: &Quotient, up: u32, down: u32) -> [Ordering; 2] {
+    let (n, d) = (N::of(&x.dividend).shifted(up), N::of(&x.divisor));
+    let an = N::of(&roots.a) * n;
+    let bd = N::of(&roots.b).shifted(down) * d;
+    let cd = N::of(&roots.c).shifted(2 * down) * d;
+    let slope = an + bd;
+    [(slope + bd) * n + cd * d, slope].map(|x| x.sign())
 }

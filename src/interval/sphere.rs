@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::exact::{Line, Roots};
-use crate::math::expansion::{two_product, two_sum};
+use crate::math::error_free::{two_product, two_sum};
 use crate::math::float::sqrt;
 use crate::math::rounding::UNIT;
 use crate::math::{sum_abs, wide};

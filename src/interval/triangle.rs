@@ -1,7 +1,5 @@
 //! Ray against triangle: filters in `f64`, and real arithmetic where they are unsure.
 
-use core::cmp::Ordering;
-
 use glam::DVec3;
 
 use crate::exact::{self, Distance, Line, Meeting};
@@ -29,7 +27,7 @@ pub(crate) struct TriangleMeeting {
 /// `|d| (|p| + |q|) |q - p|` in the norm of absolute sums. What is not larger than that bound is
 /// computed again without error.
 ///
-/// Source: \[DEG12\]; filter and exact part after \[She97\].
+/// Source: \[DEG12\]; the filter after \[She97\].
 pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let [u, v, w] = volumes(line, triangle);
     let (least, most) = (u.min(v).min(w), u.max(v).max(w));
@@ -61,8 +59,7 @@ fn volumes(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 3] {
 /// Whether all volumes that are not zero have one sign.
 fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> bool {
     let volumes = exact::volumes(line, triangle);
-    let has = |sign| volumes.iter().any(|volume| volume.sign() == sign);
-    has(Ordering::Less) != has(Ordering::Greater)
+    volumes.iter().any(|v| *v < 0.0) != volumes.iter().any(|v| *v > 0.0)
 }
 
 /// The weights of the second and the third vertex where the line meets the triangle, by one sequence
@@ -94,7 +91,9 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
     }
     let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
     let (t, t_error) = distance.approximate();
-    Some(TriangleMeeting { t, t_error, front: exact::faces(line, triangle), exact: true })
+    // None of the volumes is of the other sign.
+    let front = exact::volumes(line, triangle).iter().any(|v| *v < 0.0);
+    Some(TriangleMeeting { t, t_error, front, exact: true })
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.

@@ -3,7 +3,7 @@
 use core::cmp::Ordering;
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, Within, clamped_weights, within};
-use crate::exact::{Distance, Line, Meeting};
+use crate::exact::{Distance, Meeting};
 use crate::interval::{sphere, triangle};
 use crate::ray::{Interval, PreparedRay};
 
@@ -67,7 +67,7 @@ impl ExactMet {
             Within::All => true,
             Within::Part => {
                 watch.exact();
-                Distance::new(&line(ray), &self.meeting).is_some_and(|t| {
+                Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
                     t.compare_with(t_min) != Ordering::Less
                         && t.compare_with(t_max) != Ordering::Greater
                 })
@@ -75,10 +75,6 @@ impl ExactMet {
         };
         inside.then_some(self)
     }
-}
-
-fn line(ray: &PreparedRay) -> Line {
-    Line { origin: ray.given.origin, direction: ray.given.direction }
 }
 
 /// The real `t` of the best meeting, once a comparison has needed it.
@@ -93,7 +89,7 @@ impl ExactMemory {
     fn t_of(&mut self, ray: &PreparedRay, met: &ExactMet) -> Option<&Distance> {
         let key = (met.prim, met.root());
         if self.of != Some(key) {
-            *self = ExactMemory { of: Some(key), t: Distance::new(&line(ray), &met.meeting) };
+            *self = ExactMemory { of: Some(key), t: Distance::new(&ray.line(), &met.meeting) };
         }
         self.t.as_ref()
     }
@@ -110,7 +106,7 @@ impl Decide for Exact {
         watch: &mut impl Watch,
     ) -> Option<ExactMet> {
         watch.interval();
-        let line = line(ray);
+        let line = ray.line();
         let meeting = if lane.sure {
             triangle::plane(&line, lane.corners)
         } else {
@@ -138,7 +134,7 @@ impl Decide for Exact {
     ) -> [Option<ExactMet>; 2] {
         watch.interval();
         let SphereLane { centre, radius, .. } = *lane;
-        let Some(both) = sphere::meet(&line(ray), centre, radius) else { return [None; 2] };
+        let Some(both) = sphere::meet(&ray.line(), centre, radius) else { return [None; 2] };
         if both.exact {
             watch.exact();
         }
@@ -176,7 +172,7 @@ impl Decide for Exact {
             return first;
         }
         watch.exact();
-        let mine = Distance::new(&line(ray), &met.meeting);
+        let mine = Distance::new(&ray.line(), &met.meeting);
         match mine.zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best)) {
             Some(Ordering::Less) => true,
             Some(Ordering::Greater) => false,
@@ -197,7 +193,7 @@ impl Decide for Exact {
             nearest
         } else {
             watch.rounding();
-            Distance::new(&line(ray), &met.meeting).map_or(nearest, |t| t.round())
+            Distance::new(&ray.line(), &met.meeting).map_or(nearest, |t| t.round())
         };
         // Adding +0 turns -0 into +0.
         rounded + 0.0
@@ -210,7 +206,7 @@ impl Decide for Exact {
     fn weights(ray: &PreparedRay, met: &ExactMet) -> [f32; 2] {
         match met.meeting {
             Meeting::Triangle(corners) => {
-                clamped_weights(triangle::weights(&line(ray), corners).map(|x| x as f32))
+                clamped_weights(triangle::weights(&ray.line(), corners).map(|x| x as f32))
             }
             Meeting::Sphere { .. } => [0.0; 2],
         }

@@ -1,7 +1,8 @@
 //! A ray in a frame of its own, in which `f32` neither over- nor underflows.
 
 use super::Ray;
-use crate::math::float::{power_of_two, wide_power_of_two};
+use crate::exact::Line;
+use crate::math::float::{narrow_power_of_two, power_of_two};
 use crate::math::rounding::{f32_above, f32_below};
 
 /// A ray that can hit something, with what every box and primitive test needs of it.
@@ -58,7 +59,7 @@ fn exponent_above(x: f32) -> i32 {
 /// `x * 2^n` for `|n| <= 252`, rounded at most where it becomes subnormal.
 fn scaled(x: f32, n: i32) -> f32 {
     let half = n / 2;
-    x * power_of_two(half) * power_of_two(n - half)
+    x * narrow_power_of_two(half) * narrow_power_of_two(n - half)
 }
 
 fn largest(v: [f32; 3]) -> f32 {
@@ -80,13 +81,13 @@ impl Ray {
         }
         let reach = largest(self.origin).max(reach);
         let exponent = exponent_above(reach).clamp(-126, 126);
-        let scale = power_of_two(-exponent);
+        let scale = narrow_power_of_two(-exponent);
         // Subnormal components have no exponent of their own: two steps bring them up.
         let lift = if longest < f32::MIN_POSITIVE { 24 } else { 0 };
         let length = exponent_above(scaled(longest, lift)) - 1 - lift;
         let direction = self.direction.map(|x| scaled(x, -length));
         let t_exponent = length - exponent;
-        let t_scale = wide_power_of_two(t_exponent);
+        let t_scale = power_of_two(t_exponent);
         let in_frame = |t: f32| f64::from(t) * t_scale;
         Some(PreparedRay {
             given: Ray { t_min, t_max, ..*self },
@@ -123,6 +124,12 @@ impl Shear {
 }
 
 impl PreparedRay {
+    /// The line on which the ray lies.
+    #[inline(always)]
+    pub fn line(&self) -> Line {
+        Line { origin: self.given.origin, direction: self.given.direction }
+    }
+
     /// A float that is not below the frame's value of the given `t`.
     pub fn t_above(&self, t: f64) -> f32 {
         f32_above(t * self.t_scale)
@@ -169,7 +176,7 @@ mod tests {
                     if size >= 1e-37 {
                         assert!(ray.reach >= 0.5, "{size} {}", ray.reach);
                     }
-                    assert_eq!(f64::from(ray.scale), wide_power_of_two(-ray.exponent));
+                    assert_eq!(f64::from(ray.scale), power_of_two(-ray.exponent));
                     // The same point from both descriptions.
                     let given = f64::from(length) * f64::from(ray.scale);
                     assert_eq!(given, f64::from(ray.direction[0]) * ray.t_scale);
