@@ -75,7 +75,7 @@ step_c() { RAYKERN_SANITIZE=1 cargo test --features capi --test c_programs; }
 step_fuzz() (
     cd fuzz
     export RUSTC_BOOTSTRAP=1
-    cargo build --release --locked
+    cargo build --release
     findings=$(mktemp -d)
     for target in mesh ray block; do
         echo "-- $target"
