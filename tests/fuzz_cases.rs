@@ -59,6 +59,24 @@ fn edges_that_round_to_the_same() -> Case {
     }
 }
 
+/// The watertight mode took the rounded area's sign for the side, and left out a front as a back.
+fn fronts_that_round_to_backs() -> [Case; 2] {
+    let front = QueryOptions { facing: Facing::Front, ..DEFAULT };
+    let of = |vertices: Vec<[f32; 3]>, ray: Ray| Case {
+        model: TriangleMesh { vertices, indices: vec![[0, 1, 2]] }.into(),
+        masks: vec![0],
+        questions: vec![(ray, front), (ray, QueryOptions { facing: Facing::Back, ..DEFAULT })],
+    };
+    let from = [7.061524e35, -3.32307e35, 7.892291e35];
+    [
+        of(vec![[0.0; 3], [0.0, 3.0, 0.0], [3.0, 0.0, 0.0]], Ray::new(from.map(|x| -x), from)),
+        of(
+            vec![[1e-45, 3e-45, 4e-45], [0.0, 3e-45, 6e-45], [0.0; 3]],
+            Ray::new([0.0; 3], [8e-45, 3.8176e-41, 1e-45]),
+        ),
+    ]
+}
+
 /// Known and not mended: scene, and the normal that its first question must find, roughly.
 fn normals() -> [(&'static str, Case, [f64; 3]); 3] {
     let third = 3f64.sqrt().recip();
@@ -71,7 +89,9 @@ fn normals() -> [(&'static str, Case, [f64; 3]); 3] {
 }
 
 fn scenes_found() -> Vec<(&'static str, Case)> {
-    normals().into_iter().map(|(name, case, _)| (name, case)).collect()
+    let normals = normals().into_iter().map(|(name, case, _)| (name, case));
+    let fronts = fronts_that_round_to_backs().into_iter().map(|case| ("fronts", case));
+    normals.chain(fronts).collect()
 }
 
 fn blocks_found() -> Vec<(&'static str, Damage)> {
