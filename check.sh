@@ -3,7 +3,7 @@
 # (Debian packages by name). Under 15 minutes on two cores.
 #
 #   ./check.sh            all of it
-#   ./check.sh STEP ...   some of it: format clippy build test docs header c embree compare
+#   ./check.sh STEP ...   some of it: format clippy build test docs header c fuzz embree compare
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
@@ -22,12 +22,17 @@ step_install() {
         "${missing[@]}"
 }
 
-step_format() { cargo fmt --all -- --check; }
+step_format() {
+    cargo fmt --all -- --check
+    cargo fmt --manifest-path fuzz/Cargo.toml -- --check
+}
 
 step_clippy() {
     cargo clippy --workspace --all-targets -- -D warnings
     cargo clippy -p raykern --features capi --all-targets -- -D warnings
     cargo clippy -p raykern --no-default-features --features libm,capi --lib -- -D warnings
+    # By its manifest and from here, so that the flags for fuzzing are left out.
+    cargo clippy --manifest-path fuzz/Cargo.toml --all-targets -- -D warnings
 }
 
 # The sets of features that programs choose, each without the others' leftovers.
@@ -66,6 +71,24 @@ step_header() {
 # The C programs once more, with address and undefined-behaviour sanitizers.
 step_c() { RAYKERN_SANITIZE=1 cargo test --features capi --test c_programs; }
 
+# Each fuzz target for 20 seconds, from nothing; fuzz/README.md says how to run them for longer.
+step_fuzz() (
+    cd fuzz
+    export RUSTC_BOOTSTRAP=1
+    cargo build --release
+    findings=$(mktemp -d)
+    for target in mesh ray block; do
+        echo "-- $target"
+        if ! "target/x86_64-unknown-linux-gnu/release/$target" "-artifact_prefix=$findings/" \
+            -max_total_time=20 -max_len=2048 -len_control=0 -timeout=10 >"$findings/log" 2>&1; then
+            grep -a -A2 panicked "$findings/log" || tail -n 40 "$findings/log"
+            echo "a finding: fuzz/README.md, with the input in $findings" >&2
+            exit 1
+        fi
+        tail -n 1 "$findings/log"
+    done
+)
+
 # A million rays a scene against Embree, every difference judged exactly.
 step_embree() {
     cargo test --release -p raykern-harness --features embree --test compare_embree -- --nocapture
@@ -74,7 +97,7 @@ step_embree() {
 # The main job, cut short.
 step_compare() { cargo run --release --example compare -- --runs 2 --budget 20 --out target/compare-check; }
 
-steps=(install format clippy build test docs header c embree compare)
+steps=(install format clippy build test docs header c fuzz embree compare)
 [ $# -eq 0 ] || steps=("$@")
 for step in "${steps[@]}"; do
     started=$SECONDS

@@ -1,0 +1,119 @@
+//! Blocks as an enemy would write them, and what must hold when one is opened.
+//!
+//! Also compiled into `tests/fuzz_cases.rs`.
+
+use std::fmt;
+
+use raykern::{Accel, BuildOptions, Facing, Hit, NONE, OwnedAccel, PlainList, Precision, PrimId};
+use raykern::{QueryOptions, Ray};
+use raykern_harness::make;
+use raykern_harness::model::{Model, TriangleMesh};
+
+use crate::case::Bytes;
+
+/// A built block with words written over it, or whole bytes, and rays.
+#[derive(Clone, Debug, Default)]
+pub struct Damage {
+    /// Which of [`originals`], modulo their number.
+    pub original: usize,
+    /// Bytes from which on, and what stands there instead; modulo the size of the block.
+    pub words: Vec<(usize, u32)>,
+    /// If there are any, the block instead of an original.
+    pub bytes: Vec<u8>,
+    /// What is asked.
+    pub rays: Vec<Ray>,
+}
+
+/// Sound blocks: list, grid and BVH over a few scenes.
+pub fn originals() -> Vec<Vec<u8>> {
+    let mut mixed = make::spheres(20, 2);
+    mixed.meshes.push(make::soup(40, 2));
+    let clustered = {
+        let mut model: Model = make::plane(40).into();
+        model.meshes.push(make::blob(60, 1).placed(0.01, [0.3, 0.3, 0.1]));
+        model
+    };
+    let empty = Model { meshes: vec![TriangleMesh::default()], sphere_sets: vec![] };
+    let models = [empty, make::plane(1).into(), make::spheres(40, 3), mixed, clustered];
+    let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
+    let build = |model: &Model| {
+        model.with_scene(|scene| {
+            let never = with(PlainList::Never);
+            [
+                OwnedAccel::bvh(scene, &with(PlainList::Always)),
+                OwnedAccel::grid(scene, &never),
+                OwnedAccel::bvh(scene, &never),
+            ]
+            .map(|built| built.expect("a structure").accel().block().to_vec())
+        })
+    };
+    models.iter().flat_map(build).collect()
+}
+
+impl Damage {
+    /// The block.
+    pub fn block(&self, originals: &[Vec<u8>]) -> Vec<u8> {
+        if !self.bytes.is_empty() {
+            return self.bytes.clone();
+        }
+        let mut block = originals[self.original % originals.len()].clone();
+        for &(at, word) in &self.words {
+            let at = at % block.len();
+            for (byte, new) in block[at..].iter_mut().zip(word.to_le_bytes()) {
+                *byte = new;
+            }
+        }
+        block
+    }
+
+    /// Opens the block and, when it is accepted, asks everything. Whether it was accepted.
+    ///
+    /// Answers may be nonsense. They come, they name what the block has, and nothing panics.
+    pub fn check(&self, originals: &[Vec<u8>]) -> bool {
+        let bytes = Bytes::copy(&self.block(originals));
+        let Ok(accel) = Accel::open(bytes.get()) else { return false };
+        let info = accel.info();
+        assert!(info.size <= bytes.get().len() && accel.block().len() == info.size);
+        let id = PrimId { prim: 0, geometry: 0, instance: NONE };
+        for precision in [Precision::Exact, Precision::Watertight] {
+            let all = QueryOptions { precision, ..Default::default() };
+            let some = QueryOptions { mask: 1, facing: Facing::Front, skip: Some(id), ..all };
+            for ray in &self.rays {
+                for options in [all, some] {
+                    let hit = accel.intersect_with(ray, &options);
+                    accel.occluded_with(ray, &options);
+                    accel.intersect_counted(ray, &options, &mut Default::default());
+                    if let Some(hit) = hit {
+                        accel.surface(ray, &hit);
+                    }
+                }
+            }
+        }
+        let mut hits = vec![Hit::MISS; self.rays.len()];
+        accel.intersect_batch(&self.rays, &mut hits);
+        accel.occluded_batch(&self.rays, &mut vec![false; self.rays.len()]);
+        // Hits that nobody returned.
+        for ray in &self.rays {
+            for prim in [0, 1, 1000, NONE - 1, NONE] {
+                for geometry in [0, 1, NONE] {
+                    accel.surface(ray, &Hit { prim, geometry, t: 1.0, ..Hit::MISS });
+                }
+            }
+        }
+        true
+    }
+}
+
+/// The damage as an element of the table in `tests/fuzz_cases.rs`.
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Damage { original, words, bytes, rays } = self;
+        let rays = format!("{rays:?}").replace("inf", "f32::INFINITY").replace("NaN", "f32::NAN");
+        writeln!(f, "Damage {{")?;
+        writeln!(f, "    original: {original},")?;
+        writeln!(f, "    words: vec!{words:?},")?;
+        writeln!(f, "    bytes: vec!{bytes:?},")?;
+        writeln!(f, "    rays: vec!{rays},")?;
+        writeln!(f, "}}")
+    }
+}
