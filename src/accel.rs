@@ -288,7 +288,7 @@ impl<'m> Accel<'m> {
             return Some(surface::of_triangle(ray, corners));
         }
         let (centre, radius) = self.0.sphere_blocks.get(block)?.sphere(lane);
-        Some(surface::of_sphere(ray, D::fine_t(ray, &found), centre, radius))
+        Some(surface::of_sphere(ray, centre, radius, found.root()))
     }
 
     /// Runs the one traversal of the structure at hand with the best instructions there are.

@@ -32,10 +32,9 @@ pub(crate) fn of_triangle(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Surface 
     at(point, size, triangle::normal(corners))
 }
 
-/// The surface of a sphere at `t` along the ray.
-pub(crate) fn of_sphere(ray: &PreparedRay, t: f64, centre: [f32; 3], radius: f32) -> Surface {
-    let normal =
-        sphere::surface_normal(wide(ray.given.origin) + t * wide(ray.given.direction), centre);
+/// The surface of a sphere where the ray enters (`root` 0) or leaves it.
+pub(crate) fn of_sphere(ray: &PreparedRay, centre: [f32; 3], radius: f32, root: usize) -> Surface {
+    let normal = sphere::normal(&ray.line(), centre, radius, root);
     let centre = wide(centre);
     let radius = f64::from(radius);
     at(centre + radius * normal, centre.abs().max_element() + radius, normal)

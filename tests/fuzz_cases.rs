@@ -117,7 +117,6 @@ fn blocks_that_were_found() {
 
 /// Normals are right for edges of 1e-44 to 1e37, says the header.
 #[test]
-#[ignore = "known: these normals are zero"]
 fn normals_that_were_found() {
     for (name, case, expected) in normals() {
         let subject = Subject::build(&case.model, &case.masks);

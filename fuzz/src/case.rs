@@ -14,9 +14,6 @@ use raykern_harness::oracle::{Judgement, Oracle};
 /// The oracle judges scenes of at most so many primitives: it takes about 10 us for each.
 const JUDGED: usize = 48;
 
-/// Whether a normal of zero is a finding. Not yet: `tests/fuzz_cases.rs` has the ones that are known.
-const ZERO_NORMALS_ARE_FINDINGS: bool = false;
-
 /// Geometry, masks and questions.
 #[derive(Clone, Debug, Default)]
 pub struct Case {
@@ -169,10 +166,7 @@ fn bits(hit: Option<Hit>) -> Option<[u32; 6]> {
 fn surface_bits(accel: &Accel, ray: &Ray, hit: &Hit) -> Vec<u32> {
     let surface = accel.surface(ray, hit).unwrap_or_else(|| panic!("no surface at {hit:?}"));
     let square: f64 = surface.normal.iter().map(|x| f64::from(*x).powi(2)).sum();
-    assert!(
-        (square - 1.0).abs() < 1e-5 || (square == 0.0 && !ZERO_NORMALS_ARE_FINDINGS),
-        "{surface:?}"
-    );
+    assert!((square - 1.0).abs() < 1e-5, "{surface:?}");
     let points = [surface.position, surface.normal, surface.front_origin, surface.back_origin];
     let floats = points.as_flattened().iter().chain([&surface.position_error]);
     floats.map(|x| x.to_bits()).collect()

@@ -19,8 +19,8 @@ mod units;
 
 use core::cmp::Ordering;
 
-pub(crate) use sphere::Roots;
-pub(crate) use triangle::{has_area, volumes};
+pub(crate) use sphere::{Roots, from_centre};
+pub(crate) use triangle::{has_area, normal, volumes};
 
 use crate::math::binary::Binary;
 use sphere::Root;

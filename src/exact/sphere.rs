@@ -15,6 +15,8 @@ use crate::math::rounding::UNIT;
 
 /// Holds everything of second degree: 560 bits.
 pub(super) type Second = Integer<9>;
+/// Holds everything of third degree: 840 bits.
+type Third = Integer<14>;
 /// Holds everything of fourth degree: 1119 bits.
 type Fourth = Integer<18>;
 /// Holds everything of eighth degree: 2243 bits.
@@ -76,6 +78,31 @@ impl Roots {
         let small = if self.touch() { large } else { small };
         [large.min(small), large.max(small)].map(|t| (t, 5.0 * UNIT * t.abs()))
     }
+}
+
+/// The direction from the centre of a sphere to where the line enters (`root` 0) or leaves it, of any
+/// length, each part of it within a few units of its length; zeros for a line that misses.
+///
+/// With `v` from the centre to the origin that is `(a v - b d) -+ sqrt(D) d`: across the line and along
+/// it, neither of them longer than their sum. The first has third degree and is exact before it is rounded.
+pub(crate) fn from_centre(line: &Line, centre: [f32; 3], radius: f32, root: usize) -> [f64; 3] {
+    let space = Unit::of(&[line.origin, centre, [radius, 0.0, 0.0]]);
+    let units = Units { space, ahead: Unit::of(&[line.direction]) };
+    let Some(roots) = Roots::new(line, centre, radius) else { return [0.0; 3] };
+    let across = in_shortest!(units.bits(1, 2, 6), Third, across(units, line, centre));
+    let exponent = 2 * (roots.space + roots.ahead);
+    let along = sqrt(roots.discriminant.approximate(exponent));
+    let along = if root == 0 { -along } else { along };
+    [0, 1, 2].map(|k| across[k] + along * f64::from(line.direction[k]))
+}
+
+/// `a v - b d`.
+fn across<N: Number>(units: Units, line: &Line, centre: [f32; 3]) -> [f64; 3] {
+    let d = units.ahead.count::<N>(line.direction);
+    let v = minus(&units.space.count::<N>(line.origin), &units.space.count(centre));
+    let (a, b) = (dot(&d, &d), dot(&v, &d));
+    let exponent = units.space.exponent + 2 * units.ahead.exponent;
+    [0, 1, 2].map(|k| (a * v[k] - b * d[k]).to_integer::<14>().approximate(exponent))
 }
 
 /// One of two roots.

@@ -43,11 +43,22 @@ pub(crate) fn has_area(triangle: Triangle) -> bool {
 }
 
 fn has_area_in<N: Number>(unit: Unit, [a, b, c]: Triangle) -> bool {
-    let n = normal::<N>(&unit.count(a), &unit.count(b), &unit.count(c));
+    let n = exact_normal::<N>(&unit.count(a), &unit.count(b), &unit.count(c));
     n.iter().any(|x| x.sign() != Ordering::Equal)
 }
 
-fn normal<N: Number>(a: &[N; 3], b: &[N; 3], c: &[N; 3]) -> [N; 3] {
+/// `(b - a) x (c - a)`, each component within `1.001 UNIT` of the real one.
+pub(crate) fn normal(triangle: Triangle) -> [f64; 3] {
+    let unit = Unit::of(&triangle);
+    in_shortest!(2 * unit.bits + 3, Third, normal_in(unit, triangle))
+}
+
+fn normal_in<N: Number>(unit: Unit, [a, b, c]: Triangle) -> [f64; 3] {
+    let n = exact_normal::<N>(&unit.count(a), &unit.count(b), &unit.count(c));
+    n.map(|x| x.to_integer::<14>().approximate(2 * unit.exponent))
+}
+
+fn exact_normal<N: Number>(a: &[N; 3], b: &[N; 3], c: &[N; 3]) -> [N; 3] {
     cross(&minus(b, a), &minus(c, a))
 }
 
@@ -60,7 +71,7 @@ fn parts<N: Number>(units: Units, line: &Line, [a, b, c]: Triangle) -> [Third; 2
     let (o, d) = (units.space.count::<N>(line.origin), units.ahead.count(line.direction));
     let (a, b, c) = (units.space.count(a), units.space.count(b), units.space.count(c));
     let to_plane = minus(&a, &o);
-    let n = normal(&a, &b, &c);
+    let n = exact_normal(&a, &b, &c);
     [dot(&to_plane, &n).to_integer(), dot(&d, &n).to_integer()]
 }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::exact::{Line, Roots};
+use crate::exact::{self, Line, Roots};
 use crate::math::error_free::{two_product, two_sum};
 use crate::math::float::sqrt;
 use crate::math::rounding::UNIT;
@@ -98,9 +98,9 @@ fn power(v: DVec3, r: f64) -> (f64, f64) {
     (power, 32.0 * UNIT * UNIT * size + UNIT * power.abs())
 }
 
-/// The outward unit normal at `point`, which lies on the sphere up to rounding.
-pub(crate) fn surface_normal(point: DVec3, centre: [f32; 3]) -> DVec3 {
-    (point - wide(centre)).normalize_or_zero()
+/// The outward unit normal where the line enters (`root` 0) or leaves the sphere, within a few units.
+pub(crate) fn normal(line: &Line, centre: [f32; 3], radius: f32, root: usize) -> DVec3 {
+    DVec3::from(exact::from_centre(line, centre, radius, root)).normalize_or_zero()
 }
 
 #[cfg(test)]

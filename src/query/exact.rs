@@ -33,8 +33,8 @@ impl Meets for ExactMet {
         self.place
     }
 
-    fn front(&self) -> bool {
-        self.front
+    fn front(&self) -> Option<bool> {
+        Some(self.front)
     }
 
     fn root(&self) -> usize {
@@ -197,10 +197,6 @@ impl Decide for Exact {
         };
         // Adding +0 turns -0 into +0.
         rounded + 0.0
-    }
-
-    fn fine_t(_: &PreparedRay, met: &ExactMet) -> f64 {
-        met.t
     }
 
     fn weights(ray: &PreparedRay, met: &ExactMet) -> [f32; 2] {

@@ -161,9 +161,6 @@ pub(crate) trait Decide {
     /// The given `t` of the answer.
     fn t(ray: &PreparedRay, met: &Self::Met, watch: &mut impl Watch) -> f32;
 
-    /// The given `t` in `f64`, as well as it is known.
-    fn fine_t(ray: &PreparedRay, met: &Self::Met) -> f64;
-
     /// The weights of the second and the third vertex.
     fn weights(ray: &PreparedRay, met: &Self::Met) -> [f32; 2];
 }
@@ -172,7 +169,8 @@ pub(crate) trait Decide {
 pub(crate) trait Meets {
     fn prim(&self) -> u32;
     fn place(&self) -> (u32, u32);
-    fn front(&self) -> bool;
+    /// Whether the ray meets the front; `None` when this cannot tell.
+    fn front(&self) -> Option<bool>;
     /// Which of the meetings with one primitive it is.
     fn root(&self) -> usize;
     /// Whether skipping the primitive skips this: false for the root of a sphere that is not the

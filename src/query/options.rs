@@ -80,12 +80,12 @@ impl<'m> Filter<'m> {
         self.facing == Facing::Both
     }
 
-    /// Whether a meeting with this side counts.
-    pub fn faces(&self, front: bool) -> bool {
+    /// Whether a meeting with this side counts; an unknown one does.
+    pub fn faces(&self, front: Option<bool>) -> bool {
         match self.facing {
             Facing::Both => true,
-            Facing::Front => front,
-            Facing::Back => !front,
+            Facing::Front => front != Some(false),
+            Facing::Back => front != Some(true),
         }
     }
 

@@ -15,7 +15,7 @@ pub(crate) struct WatertightMet {
     weights: [f32; 2],
     prim: u32,
     place: (u32, u32),
-    front: bool,
+    front: Option<bool>,
     root: usize,
     skippable: bool,
 }
@@ -29,7 +29,7 @@ impl Meets for WatertightMet {
         self.place
     }
 
-    fn front(&self) -> bool {
+    fn front(&self) -> Option<bool> {
         self.front
     }
 
@@ -81,7 +81,7 @@ impl Decide for Watertight {
                 weights: [0.0; 2],
                 prim: lane.prim,
                 place: lane.place,
-                front: root == 0,
+                front: Some(root == 0),
                 root,
                 skippable: root == nearest || lane.detail.t[0] == lane.detail.t[1],
             })
@@ -106,10 +106,6 @@ impl Decide for Watertight {
         // Out of the frame; what rounding at the limits moved goes back between them.
         let t = (f64::from(met.t) / ray.t_scale) as f32;
         limit(t, ray.given.t_min, ray.given.t_max) + 0.0
-    }
-
-    fn fine_t(ray: &PreparedRay, met: &WatertightMet) -> f64 {
-        f64::from(met.t) / ray.t_scale
     }
 
     fn weights(_: &PreparedRay, met: &WatertightMet) -> [f32; 2] {

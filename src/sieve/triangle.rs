@@ -117,6 +117,7 @@ struct Sieved<V> {
     over_b: V,
     over_c: V,
     total: V,
+    area_error: V,
     /// The depth of the meeting, from that of the first vertex, times the size of `total`.
     rise: V,
     first_depth: V,
@@ -186,6 +187,7 @@ fn sieve<S: Width<N>, const N: usize>(
         over_b,
         over_c,
         total,
+        area_error,
         rise,
         first_depth: a.depth,
         nearest_depth,
@@ -243,8 +245,8 @@ pub(crate) struct TriangleDetail {
     pub t: f32,
     /// Weights of the second and the third vertex.
     pub weights: [f32; 2],
-    /// Whether the line meets the front; right where the filter is sure.
-    pub front: bool,
+    /// Whether the line meets the front, where rounding leaves no doubt.
+    pub front: Option<bool>,
 }
 
 #[inline(always)]
@@ -261,21 +263,24 @@ pub(crate) fn is_candidate(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3
 /// What the filter knows of a triangle that it does not reject.
 pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
     let sieved = sieve_one(ray, &Depths::new(ray, ray.t_max), corners);
-    let [over_b, over_c, total, rise, first, nearest, farthest] = [
+    let [over_b, over_c, total, area_error, rise, first, nearest, farthest] = [
         sieved.over_b,
         sieved.over_c,
         sieved.total,
+        sieved.area_error,
         sieved.rise,
         sieved.first_depth,
         sieved.nearest_depth,
         sieved.farthest_depth,
     ]
     .map(|[x]| x);
+    // The total carries the errors of three areas, and less than as much again of its own.
+    let is_clear = total.abs() > 6.0 * area_error;
     // A NaN, from 0 / 0, loses to the depths of the vertices.
     let depth = (first + rise / total.abs()).max(nearest).min(farthest);
     TriangleDetail {
         t: depth / ray.shear.depth_rate,
         weights: [over_b / total, over_c / total],
-        front: (total < 0.0) == (ray.shear.depth_sign > 0.0),
+        front: is_clear.then_some((total < 0.0) == (ray.shear.depth_sign > 0.0)),
     }
 }

@@ -53,8 +53,8 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// So few lanes of 16 are faster one by one.
     const FEW: u32;
 
-    /// Lane `i` of the result is lane `corner(i)` of `table`, with the corners as a
-    /// [`TriangleBlock`](crate::block::leaf::TriangleBlock) lists them.
+    /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
+    /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
     fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V;
 
     /// Runs `kernel` with the backend's instructions; all that it inlines may use them.
@@ -138,7 +138,7 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     }
 }
 
-/// The place in a list of corners at which lane `i` stands: see `TriangleBlock`.
+/// The lane that `list` names for lane `i`: see [`Simd::corners`].
 fn corner(list: &[u8; 8], i: usize) -> usize {
     let place = i % 2 * 8 + i / 2 % 8;
     usize::from(list[place / 2] >> (4 * (place % 2)) & 15)
