@@ -187,3 +187,16 @@ fn exact_families_are_exact() {
     let level = ["level-balls", "level-mixed", "layers"].map(share_of_ties);
     assert!(level.iter().sum::<f64>() > 0.2, "{level:?}");
 }
+
+/// Nothing leaves a closed mesh: a check of the oracle and of the family at once.
+#[test]
+fn no_ray_leaves_a_closed_mesh() {
+    let family = Family::by_name("closed-inside").expect("a family");
+    for number in 0..12 {
+        let case = family.case(11, number);
+        let oracle = Oracle::new(&case.scenery.model);
+        for Shot { ray, .. } in case.shots {
+            assert!(oracle.closest(&ray, &Default::default()).hit.is_some(), "{ray:?}");
+        }
+    }
+}

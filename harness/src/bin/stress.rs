@@ -3,7 +3,7 @@
 //! Exits with 1 when an exact answer is wrong, when the three structures differ, or when watertight
 //! precision misses what is hit; each failure is shrunk and printed as a test.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -11,7 +11,7 @@ use clap::Parser;
 use raykern_harness::stress::embree::compiled;
 use raykern_harness::stress::run::{Failure, Plan, run};
 use raykern_harness::stress::subject::{Build, Structures};
-use raykern_harness::stress::{ALL, Family, as_test, csv, shrink, table};
+use raykern_harness::stress::{ALL, Family, as_test, csv, markdown, shrink, table};
 
 /// Stress raykern, judge every answer exactly, and print a table by family.
 #[derive(Parser)]
@@ -31,6 +31,9 @@ struct Options {
     /// Write all counts to this file.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write the table of docs/ACCURACY.md to this file.
+    #[arg(long, value_name = "FILE")]
+    markdown: Option<PathBuf>,
     /// How many threads [default: one for each processor].
     #[arg(long)]
     threads: Option<usize>,
@@ -80,10 +83,8 @@ fn stress(options: &Options) -> Result<bool, String> {
     }
     print!("{}", table(&families, &outcome.rows, options.embree));
     println!("seed {}, {:.0} s", options.seed, started.elapsed().as_secs_f64());
-    if let Some(file) = &options.csv {
-        std::fs::write(file, csv(&families, &outcome.rows))
-            .map_err(|error| format!("{}: {error}", file.display()))?;
-    }
+    write(options.csv.as_deref(), &csv(&families, &outcome.rows))?;
+    write(options.markdown.as_deref(), &markdown(&families, &outcome.rows))?;
     outcome.failures.iter().take(options.show).for_each(|failure| show(failure, options, build));
     Ok(outcome.rows.iter().all(|row| row.is_right()) && outcome.failures.is_empty())
 }
@@ -94,6 +95,12 @@ fn families(names: &[String]) -> Result<Vec<Family>, String> {
     }
     let find = |name: &String| Family::by_name(name).ok_or(format!("no family {name}: see --list"));
     names.iter().map(find).collect()
+}
+
+/// Writes to the file, if one is wanted.
+fn write(file: Option<&Path>, text: &str) -> Result<(), String> {
+    let Some(file) = file else { return Ok(()) };
+    std::fs::write(file, text).map_err(|error| format!("{}: {error}", file.display()))
 }
 
 /// Shrinks and prints.

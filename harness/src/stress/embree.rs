@@ -41,7 +41,8 @@ impl<'a> Embree<'a> {
 
     /// The default and the robust answer to each ray, `None` to those that Embree may not be asked:
     /// rays with options, with negative limits, and whatever has a component that is not finite or
-    /// beyond 1.8e18.
+    /// beyond 1.8e18. It aborts on a few scenes within these bounds as well, and then none of the
+    /// scene's rays count as asked.
     pub fn answers(&mut self, case: &Case) -> Vec<Option<[Option<Hit>; 2]>> {
         let none = vec![None; case.shots.len()];
         let asked: Vec<usize> =

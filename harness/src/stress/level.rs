@@ -37,8 +37,8 @@ pub fn mixed(random: &mut Random, count: usize) -> Case {
 
 /// The same, scaled by any power of two that floats allow, and moved away.
 pub fn wild(random: &mut Random, count: usize) -> Case {
-    let scale = 2f32.powi(random.between(-120.0, 115.0) as i32);
-    // Up to 2^17 away every sum stays exact.
+    // Down to the least float; up to 2^17 away every sum stays exact and finite.
+    let scale = 2f64.powi(random.between(-147.0, 108.0) as i32) as f32;
     let offset = [0.0, 64.0, 4096.0, 131_072.0][random.below(4)];
     meetings(random, count, 0.5, [scale, scale * offset])
 }

@@ -34,7 +34,7 @@ use crate::make::Random;
 use crate::model::Model;
 use crate::oracle::Oracle;
 pub use paste::as_test;
-pub use table::{csv, table};
+pub use table::{csv, markdown, table};
 
 /// A scene with the masks of its geometries; missing ones are 0.
 #[derive(Clone, Debug, Default)]

@@ -141,11 +141,16 @@ impl Row {
         self.seconds += other.seconds;
     }
 
-    /// Whether nothing happened that must not.
-    pub fn is_right(&self) -> bool {
+    /// Exact answers that are not right, and contradictions.
+    pub fn wrong(&self) -> u64 {
         let Score { false_misses, false_hits, wrong_prims, wrong_ties, wrong_ts, .. } = self.exact;
         let wrong = false_misses + false_hits + wrong_prims + wrong_ties + wrong_ts;
-        wrong + self.exact.wrong_weights + self.differences + self.watertight.false_misses == 0
+        wrong + self.exact.wrong_weights + self.differences
+    }
+
+    /// Whether nothing happened that must not.
+    pub fn is_right(&self) -> bool {
+        self.wrong() + self.watertight.false_misses == 0
     }
 }
 

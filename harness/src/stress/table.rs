@@ -25,13 +25,18 @@ pub fn table(families: &[Family], rows: &[Row], embree: bool) -> String {
         let _ = write!(out, " |{rays}   miss    hit   prim    tie  t>64u max ulp");
     });
     out.push('\n');
-    let mut all = Row::default();
-    for (family, row) in families.iter().zip(rows) {
-        all.merge(row);
-        line(&mut out, family.name, row, embree);
+    let total = total(rows);
+    let named = families.iter().map(|family| family.name).zip(rows);
+    for (name, row) in named.chain([("all", &total)]) {
+        line(&mut out, name, row, embree);
     }
-    line(&mut out, "all", &all, embree);
     out.lines().map(|line| line.trim_end().to_owned() + "\n").collect()
+}
+
+fn total(rows: &[Row]) -> Row {
+    let mut total = Row::default();
+    rows.iter().for_each(|row| total.merge(row));
+    total
 }
 
 fn line(out: &mut String, name: &str, row: &Row, embree: bool) {
@@ -99,4 +104,65 @@ pub fn csv(families: &[Family], rows: &[Row]) -> String {
         out.push('\n');
     }
     out
+}
+
+/// The table of docs/ACCURACY.md: with Embree's answers, and ours in one column.
+pub fn markdown(families: &[Family], rows: &[Row]) -> String {
+    let mut out = "| family | rays | hits | ties | exact: wrong | watertight: miss, hit, prim \
+                   | Embree: asked | miss | hit | prim | robust: miss | hit | prim |\n|---"
+        .to_owned();
+    out += &"|--:".repeat(12);
+    out += "|\n";
+    let total = total(rows);
+    let named = families.iter().map(|family| family.name).zip(rows);
+    for (name, row) in named.chain([("all", &total)]) {
+        let Row { rays, hits, ties, watertight, embree: [plain, robust], .. } = row;
+        let counts = |s: &Score| [s.false_misses, s.false_hits, s.wrong_prims].map(grouped);
+        let cells = [*rays, *hits, *ties, row.wrong()].map(grouped).join(" | ");
+        let asked = |s: &Score| match s.rays {
+            0 => "- | - | -".to_owned(),
+            _ => counts(s).join(" | "),
+        };
+        let _ = writeln!(
+            out,
+            "| {name} | {cells} | {} | {} | {} | {} |",
+            counts(watertight).join(", "),
+            grouped(plain.rays),
+            asked(plain),
+            asked(robust)
+        );
+    }
+    out
+}
+
+/// With a comma after each three digits.
+fn grouped(count: u64) -> String {
+    let digits = count.to_string();
+    let groups: Vec<_> = digits.as_bytes().rchunks(3).rev().map(String::from_utf8_lossy).collect();
+    groups.join(",")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stress::ALL;
+
+    #[test]
+    fn every_line_of_a_table_has_all_columns() {
+        let mut rows = vec![Row::default(); ALL.len()];
+        rows[0].rays = 1_234_567;
+        rows[0].embree[0].rays = 1000;
+        let columns = |text: String, mark: char| -> Vec<usize> {
+            text.lines().map(|line| line.matches(mark).count()).collect()
+        };
+        for (text, mark) in [(csv(&ALL, &rows), ','), (markdown(&ALL, &rows), '|')] {
+            let columns = columns(text, mark);
+            assert!(columns.iter().all(|count| *count == columns[0]), "{columns:?}");
+        }
+        assert!(
+            markdown(&ALL, &rows)
+                .contains("| ordinary | 1,234,567 | 0 | 0 | 0 | 0, 0, 0 | 1,000 |")
+        );
+        assert_eq!(table(&ALL, &rows, true).lines().count(), ALL.len() + 3);
+    }
 }
