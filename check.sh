@@ -3,7 +3,7 @@
 # (Debian packages by name). Under 15 minutes on two cores.
 #
 #   ./check.sh            all of it
-#   ./check.sh STEP ...   some of it: format clippy build test docs header c fuzz embree compare
+#   ./check.sh STEP ...   some of it: format clippy build test docs header c fuzz embree stress compare
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
@@ -94,10 +94,15 @@ step_embree() {
     cargo test --release -p raykern-harness --features embree --test compare_embree -- --nocapture
 }
 
+# Rays that look for trouble, all answers judged exactly; Embree on the same rays.
+step_stress() {
+    cargo run --release -p raykern-harness --bin stress -- --rays 200000 --embree
+}
+
 # The main job, cut short.
 step_compare() { cargo run --release --example compare -- --runs 2 --budget 20 --out target/compare-check; }
 
-steps=(install format clippy build test docs header c fuzz embree compare)
+steps=(install format clippy build test docs header c fuzz embree stress compare)
 [ $# -eq 0 ] || steps=("$@")
 for step in "${steps[@]}"; do
     started=$SECONDS

@@ -10,3 +10,4 @@ pub mod render;
 pub mod scenes;
 pub mod shared_scenes;
 pub mod stats;
+pub mod stress;

@@ -23,10 +23,18 @@ pub struct Model {
 impl Model {
     /// Calls `f` with the scene that borrows this model.
     pub fn with_scene<R>(&self, f: impl FnOnce(&Scene) -> R) -> R {
-        let meshes: Vec<Mesh> =
-            self.meshes.iter().map(|m| Mesh::indexed(&m.vertices, &m.indices)).collect();
+        self.with_masked_scene(&[], f)
+    }
+
+    /// The same with mask `masks[i]` on geometry `i`; missing ones are 0.
+    pub fn with_masked_scene<R>(&self, masks: &[u32], f: impl FnOnce(&Scene) -> R) -> R {
+        let mut masks = masks.iter().copied().chain(std::iter::repeat(0));
+        let mut next = || masks.next().unwrap_or(0);
+        let meshes: Vec<Mesh> = (self.meshes.iter())
+            .map(|m| Mesh::indexed(&m.vertices, &m.indices).with_mask(next()))
+            .collect();
         let sphere_sets: Vec<SphereSet> =
-            self.sphere_sets.iter().map(|s| SphereSet::new(s)).collect();
+            self.sphere_sets.iter().map(|s| SphereSet::new(s).with_mask(next())).collect();
         f(&Scene::new(&meshes, &sphere_sets))
     }
 

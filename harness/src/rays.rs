@@ -311,24 +311,24 @@ impl<'a> RayMaker<'a> {
 }
 
 /// From `from` with `t = 1` at `to`, up to rounding.
-fn aimed(from: [f32; 3], to: [f32; 3]) -> Ray {
+pub(crate) fn aimed(from: [f32; 3], to: [f32; 3]) -> Ray {
     Ray::new(from, nonzero(std::array::from_fn(|k| f64::from(to[k]) - f64::from(from[k]))))
 }
 
-fn mix(a: [f32; 3], b: [f32; 3], s: f64) -> [f32; 3] {
+pub(crate) fn mix(a: [f32; 3], b: [f32; 3], s: f64) -> [f32; 3] {
     round(std::array::from_fn(|k| f64::from(a[k]) * (1.0 - s) + f64::from(b[k]) * s))
 }
 
-fn length(v: [f64; 3]) -> f64 {
+pub(crate) fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 /// Rounded, and cut to what is finite.
-fn round(v: [f64; 3]) -> [f32; 3] {
+pub(crate) fn round(v: [f64; 3]) -> [f32; 3] {
     v.map(|x| (x as f32).clamp(-f32::MAX, f32::MAX))
 }
 
-fn nonzero(v: [f64; 3]) -> [f32; 3] {
+pub(crate) fn nonzero(v: [f64; 3]) -> [f32; 3] {
     let direction = round(v);
     if direction == [0.0; 3] { [1.0, 0.0, 0.0] } else { direction }
 }

@@ -113,8 +113,9 @@ impl Oracle {
 fn hits_anything(ray: &Ray) -> bool {
     let finite = |v: [f32; 3]| v.iter().all(|x| x.is_finite());
     let moves = ray.direction.iter().any(|x| *x != 0.0);
-    // A NaN limit fails the comparison.
-    finite(ray.origin) && finite(ray.direction) && moves && ray.t_min <= ray.t_max
+    // Between two infinities of one sign there is no real number. A NaN limit fails the comparisons.
+    let some_t = ray.t_min <= ray.t_max && ray.t_min < f32::INFINITY && ray.t_max > -f32::INFINITY;
+    finite(ray.origin) && finite(ray.direction) && moves && some_t
 }
 
 fn faces(hit: &ExactHit, facing: Facing) -> bool {

@@ -90,6 +90,8 @@ fn rays_that_hit_nothing_by_definition() {
         good.with_limits(f32::NAN, 2.0),
         good.with_limits(0.0, f32::NAN),
         good.with_limits(2.0, 0.5),
+        good.with_limits(f32::INFINITY, f32::INFINITY),
+        good.with_limits(f32::NEG_INFINITY, f32::NEG_INFINITY),
     ] {
         assert_eq!(answer(bad, ALL), None, "{bad:?}");
     }
