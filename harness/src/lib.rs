@@ -8,5 +8,6 @@ pub mod oracle;
 pub mod rays;
 pub mod render;
 pub mod scenes;
+pub mod search;
 pub mod shared_scenes;
 pub mod stats;

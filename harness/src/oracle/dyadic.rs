@@ -38,6 +38,20 @@ impl Dyadic {
         Dyadic { mantissa: BigInt::from(signed >> spare), exponent: exponent + spare as i32 }
     }
 
+    /// The very value of `x`.
+    ///
+    /// # Panics
+    ///
+    /// When `x` is not finite.
+    pub fn from_f64(x: f64) -> Self {
+        assert!(x.is_finite(), "{x} is no number");
+        let bits = x.to_bits();
+        let (field, fraction) = ((bits >> 52 & 0x7ff) as i32, (bits & ((1 << 52) - 1)) as i64);
+        let magnitude = if field == 0 { fraction } else { fraction | 1 << 52 };
+        let signed = if x < 0.0 { -magnitude } else { magnitude };
+        Dyadic { mantissa: BigInt::from(signed), exponent: field.max(1) - 1075 }
+    }
+
     /// Half of it.
     pub fn half(mut self) -> Self {
         self.exponent -= 1;
@@ -189,6 +203,7 @@ mod tests {
             let exact = Dyadic::from_f32(x);
             assert_eq!(exact.sign(), sign, "{x}");
             assert_eq!(exact.ratio(&one), f64::from(x));
+            assert_eq!(Dyadic::from_f64(f64::from(x)), exact);
         }
         let (a, b) = (Dyadic::from_f32(3e38), Dyadic::from_f32(1e-45));
         assert_eq!(&(&(&a + &b) - &a), &b);

@@ -10,7 +10,7 @@
 //! sphere leaves out that point. Of two roots as far from `t = 0` as each other, skipping leaves out
 //! the entering one.
 
-mod dyadic;
+pub mod dyadic;
 mod judge;
 mod root;
 mod sieve;
