@@ -10,6 +10,8 @@ pub(super) trait Real: Copy + PartialOrd {
     /// A component this much slower than the fastest one stands still: it moves the ray by less than
     /// a rounding while it crosses the grid.
     const STANDSTILL: f64;
+    /// A ray that crosses more cells than this in one `t` does not step: its `t` would underflow.
+    const FASTEST: f64;
     const INFINITY: Self;
 
     /// The nearest number.
@@ -26,10 +28,11 @@ pub(super) trait Real: Copy + PartialOrd {
 }
 
 macro_rules! real {
-    ($float:ty, $standstill:expr) => {
+    ($float:ty, $standstill:expr, $fastest:expr) => {
         impl Real for $float {
             const UNIT: f64 = <$float>::EPSILON as f64 / 2.0;
             const STANDSTILL: f64 = $standstill;
+            const FASTEST: f64 = $fastest;
             const INFINITY: Self = <$float>::INFINITY;
 
             fn near(x: f64) -> Self {
@@ -64,8 +67,8 @@ macro_rules! real {
     };
 }
 
-real!(f32, 1.0 / (1u64 << 40) as f64);
-real!(f64, 1.0 / (1u64 << 62) as f64);
+real!(f32, 1.0 / (1u64 << 40) as f64, (1u128 << 100) as f64);
+real!(f64, 1.0 / (1u64 << 62) as f64, f64::MAX);
 
 /// Where the walk is.
 ///
@@ -86,7 +89,7 @@ pub(super) struct Steps<F> {
     forwards: [bool; 3],
     resolution: [u32; 3],
     /// The `t` of the next wall on each axis.
-    t_next: [F; 3],
+    pub t_next: [F; 3],
     /// Where the ray leaves the grid, or the bound at the start.
     far: F,
 }

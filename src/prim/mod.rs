@@ -1,5 +1,7 @@
 //! What can be hit: the layer that list, grid and BVH stand on.
 
+#[cfg(test)]
+mod bounds;
 mod gather;
 mod pack;
 mod sphere;

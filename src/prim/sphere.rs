@@ -17,6 +17,37 @@ fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
     p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
 }
 
+/// Where the ray's line passes a sphere.
+pub(super) struct Chord {
+    /// From the centre to the origin.
+    v: [f32; 3],
+    /// `d . d` and `v . d`.
+    a: f32,
+    b: f32,
+    /// The `t` of the point nearest the centre.
+    pub middle: f32,
+    /// A bound on the length of `v`.
+    pub reach: f32,
+    /// The square of half the chord.
+    pub discriminant: f32,
+    /// What the discriminant may be off.
+    pub unsure: f32,
+}
+
+pub(super) fn chord(ray: &PreparedRay, centre: [f32; 3], r: f32) -> Chord {
+    let d = ray.direction;
+    let v = [0, 1, 2].map(|k| ray.origin[k] - centre[k] * ray.scale);
+    let (a, b) = (dot(d, d), dot(v, d));
+    let middle = -(b / a);
+    let l = [0, 1, 2].map(|k| v[k] + d[k] * middle);
+    let (reach, near) = (sum_abs(v), sum_abs(l));
+    let unsure = 32.0 * UNIT32 * near * reach
+        + (16.0 * UNIT32 * reach) * (16.0 * UNIT32 * reach)
+        + 16.0 * UNIT32 * (near * near + r * r)
+        + TINY;
+    Chord { v, a, b, middle, reach, discriminant: r * r - dot(l, l), unsure }
+}
+
 /// The sphere in a lane, unless the ray surely does not meet it within its limits and up to the
 /// bound.
 ///
@@ -32,22 +63,13 @@ pub(crate) fn lane(
     prim: u32,
 ) -> Option<SphereLane> {
     let (centre, radius) = block.sphere(place.1 as usize);
-    let (d, r) = (ray.direction, radius * ray.scale);
-    let v = [0, 1, 2].map(|k| ray.origin[k] - centre[k] * ray.scale);
-    let (a, b) = (dot(d, d), dot(v, d));
-    let middle = -(b / a);
-    let l = [0, 1, 2].map(|k| v[k] + d[k] * middle);
-    let (reach, near) = (sum_abs(v), sum_abs(l));
-    let unsure = 32.0 * UNIT32 * near * reach
-        + (16.0 * UNIT32 * reach) * (16.0 * UNIT32 * reach)
-        + 16.0 * UNIT32 * (near * near + r * r)
-        + TINY;
-    let discriminant = r * r - dot(l, l);
+    let r = radius * ray.scale;
+    let Chord { v, a, b, middle, reach, discriminant, unsure } = chord(ray, centre, r);
     if discriminant < -unsure {
         return None;
     }
     // The line is inside for at most the radius on either side, as the direction is at least 1 long.
-    let half = r * (1.0 + 8.0 * UNIT32) + 32.0 * UNIT32 * (reach + r);
+    let half = r * (1.0 + 8.0 * UNIT32) + 32.0 * UNIT32 * (reach + r) + TINY;
     if middle - half > t_bound || middle + half < ray.t_min {
         return None;
     }
@@ -62,7 +84,7 @@ pub(crate) fn lane(
     let small = small.max(middle - half).min(middle + half);
     // Infinite where the line touches the sphere at its origin.
     let from_power = 16.0 * UNIT32 * (reach * reach + r * r) / q.abs();
-    let t_error = (most - least) + 64.0 * UNIT32 * (reach + r) + from_power;
+    let t_error = (most - least) + 64.0 * UNIT32 * (reach + r) + from_power + TINY;
     Some(SphereLane {
         centre,
         radius,

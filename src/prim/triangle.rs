@@ -21,13 +21,15 @@ pub(crate) struct Depths {
 
 impl Depths {
     pub fn new(ray: &PreparedRay, t_bound: f32) -> Self {
-        // A product rounds once; infinite depths stay as they are.
+        // A product rounds once. Infinite depths stay as they are: only their finite part is widened.
         let rate = ray.shear.depth_rate;
-        let lower = |t: f32| t * rate - (t * rate).abs() * (4.0 * UNIT32);
-        let upper = |t: f32| t * rate + (t * rate).abs() * (4.0 * UNIT32);
+        let slack = |t: f32| (t * rate).abs().min(f32::MAX) * (4.0 * UNIT32);
+        let lower = |t: f32| t * rate - slack(t);
+        let upper = |t: f32| t * rate + slack(t);
         Depths {
-            low: lower(ray.t_min),
-            high: upper(t_bound),
+            // Depths of vertices are off by what scaling to the frame took below its least float.
+            low: lower(ray.t_min) - TINY,
+            high: upper(t_bound) + TINY,
             inside: [upper(ray.t_inside[0]), lower(ray.t_inside[1])],
         }
     }
@@ -35,16 +37,16 @@ impl Depths {
 
 /// A vertex in the sheared space: the ray is the line x = y = 0, and depth grows along it.
 #[derive(Clone, Copy)]
-struct Sheared {
-    x: f32,
-    y: f32,
+pub(super) struct Sheared {
+    pub x: f32,
+    pub y: f32,
     /// Depth from the frame's zero, without rounding.
-    raw: f32,
+    pub raw: f32,
     /// Depth from the ray's origin.
-    depth: f32,
+    pub depth: f32,
 }
 
-fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
+pub(super) fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
     let shear = &ray.shear;
     let [kx, ky, kz] = shear.axes;
     let raw = vertex[kz] * (ray.scale * shear.depth_sign);
@@ -57,15 +59,36 @@ fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
     }
 }
 
+/// Twice the area that the ray's point spans with an edge.
+pub(super) fn area(p: &Sheared, q: &Sheared) -> f32 {
+    p.x * q.y - p.y * q.x
+}
+
+/// What x and y of a vertex may be off, when none is larger than `size` and no depth than `deepest`.
+pub(super) fn coordinate_error(size: f32, steepness: f32, deepest: f32) -> f32 {
+    UNIT32 * (2.5 * size + 5.5 * steepness * deepest)
+}
+
+/// What an area may be off, when coordinates are off by `shift`.
+pub(super) fn area_error(shift: f32, size: f32) -> f32 {
+    shift * (4.0 * size + 2.0 * shift) + 4.5 * UNIT32 * (size * size) + TINY
+}
+
+/// What `rise` may be off the depth of the meeting times the total area, and what the comparison of
+/// both with a limit may be off, even if the total has the wrong sign.
+pub(super) fn rise_error(area_error: f32, span: f32, depth: f32, size_of_total: f32) -> f32 {
+    20.0 * area_error * span + 5.0 * UNIT32 * (depth.abs() + span) * size_of_total + TINY
+}
+
 /// What is left of a lane after the filter.
-#[derive(Clone, Copy)]
-struct Sieved {
-    sure: bool,
-    inside: bool,
-    front: bool,
-    nearest: f32,
-    t: f32,
-    weights: [f32; 2],
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sieved {
+    pub sure: bool,
+    pub inside: bool,
+    pub front: bool,
+    pub nearest: f32,
+    pub t: f32,
+    pub weights: [f32; 2],
 }
 
 /// The filter for one triangle; `None` only when the ray does not meet it within its limits and up to
@@ -77,7 +100,7 @@ struct Sieved {
 /// every backend computes the same bits. `docs/METHODS.md` derives the constants.
 ///
 /// Source: \[WBW13\] for the shear; the bounds are our own.
-fn sieve(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Option<Sieved> {
+pub(super) fn sieve(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Option<Sieved> {
     let [a, b, c] = corners.map(|vertex| sheared(ray, vertex));
     let nearest_depth = a.depth.min(b.depth).min(c.depth);
     let farthest_depth = a.depth.max(b.depth).max(c.depth);
@@ -88,14 +111,11 @@ fn sieve(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Option<S
         return None;
     }
     // Twice the areas that the ray's point spans with the edges, each over the vertex opposite to it.
-    let area = |p: &Sheared, q: &Sheared| p.x * q.y - p.y * q.x;
     let (over_a, over_b, over_c) = (area(&b, &c), area(&c, &a), area(&a, &b));
     let in_plane = |v: &Sheared| v.x.abs().max(v.y.abs());
     let size = in_plane(&a).max(in_plane(&b)).max(in_plane(&c));
     let deepest = a.depth.abs().max(b.depth.abs()).max(c.depth.abs());
-    // The error of a coordinate, and that of an area.
-    let shift = UNIT32 * (2.5 * size + 5.5 * ray.shear.steepness * deepest);
-    let area_error = shift * (4.0 * size + 2.0 * shift) + 4.5 * UNIT32 * (size * size) + TINY;
+    let area_error = area_error(coordinate_error(size, ray.shear.steepness, deepest), size);
     let least = over_a.min(over_b).min(over_c);
     let most = over_a.max(over_b).max(over_c);
     if least < -area_error && most > area_error {
@@ -108,8 +128,7 @@ fn sieve(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Option<S
     let (to_b, to_c) = (b.raw - a.raw, c.raw - a.raw);
     let rise = (over_b * to_b + over_c * to_c) * 1f32.copysign(total);
     let span = to_b.abs().max(to_c.abs());
-    let error =
-        20.0 * area_error * span + 5.0 * UNIT32 * (a.depth.abs() + span) * size_of_total + TINY;
+    let error = rise_error(area_error, span, a.depth, size_of_total);
     let beyond = |depth: f32| rise - (depth - a.depth) * size_of_total;
     if beyond(depths.high) > error || beyond(depths.low) < -error {
         return None;
@@ -123,7 +142,7 @@ fn sieve(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Option<S
         sure,
         inside,
         front: (total < 0.0) == (ray.shear.depth_sign > 0.0),
-        nearest: (low - low.abs() * (8.0 * UNIT32)) / rate,
+        nearest: (low - low.abs() * (8.0 * UNIT32) - TINY) / rate,
         t: depth / rate,
         weights: [over_b / total, over_c / total],
     })

@@ -23,9 +23,9 @@ pub(crate) trait Slab {
 /// With `r` the scaled reciprocal of a component, the distance to a wall is `wall * r - shift`, where
 /// `shift` holds `origin * r` and all that rounding may add. `docs/METHODS.md` derives the padding.
 pub(crate) struct NarrowSlab {
-    reciprocal: [f32; 3],
-    near_shift: [f32; 3],
-    far_shift: [f32; 3],
+    pub(super) reciprocal: [f32; 3],
+    pub(super) near_shift: [f32; 3],
+    pub(super) far_shift: [f32; 3],
     t_min: f32,
 }
 
@@ -86,7 +86,7 @@ impl Slab for NarrowSlab {
 pub(crate) struct WideSlab {
     origin: DVec3,
     /// The reciprocal of the direction in the frame, from given coordinates.
-    inverse: DVec3,
+    pub(super) inverse: DVec3,
     t_min: f64,
 }
 
