@@ -75,10 +75,10 @@ real!(f64, 1.0 / (1u64 << 62) as f64, f64::MAX);
 /// The `t` of a wall comes from its number, `(i - origin) / direction`, and never from adding up steps, so
 /// errors do not grow along the ray. At each real `t` the walk is in the cell whose walls have been
 /// passed by their computed `t`. With `C` the [extent](CellRay::extent) and `u` the unit: rounding the
-/// origin moves the ray by `u C`; a wall's `t` carries four roundings (component, reciprocal, difference,
-/// product), which move the point where it is passed by `4 u C`; and the cell at the start carries
-/// four of at most `C` (origin, component, product, sum). So a coordinate of the ray is off the
-/// cell of the walk by at most `6 u C`.
+/// origin moves the ray by `u C`, in `f64` by `2 u C`; a wall's `t` carries four roundings (component,
+/// reciprocal, difference, product), which move the point where it is passed by `4 u C`; and the cell
+/// at the start carries origin, component, `t`, product and sum. So a coordinate of the ray is off
+/// the cell of the walk by at most `6 u C`.
 ///
 /// Source: \[AW87\], in the form that takes `t` from the index.
 pub(super) struct Steps<F> {

@@ -7,7 +7,7 @@ use raykern_harness::oracle::dyadic::Dyadic;
 use raykern_harness::search::{Worst, samples};
 
 use super::{NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
-use crate::math::rounding::{f32_above, f32_below, gamma};
+use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
 
 const RANGES: [[i32; 2]; 5] = [[-149, 127], [-149, -120], [60, 127], [-20, 20], [-2, 2]];
@@ -130,7 +130,7 @@ fn wide_boxes() {
         let real = &Dyadic::from_f32(wall) - &Dyadic::from_f32(o);
         let real = &real * &Dyadic::from_f64(ray.t_scale);
         let product = &Dyadic::from_f64(x) * &Dyadic::from_f32(d);
-        worst.see((&product - &real).ratio(&product), gamma(6));
+        worst.see((&product - &real).ratio(&product), WideSlab::PAD);
     }
     worst.assert_tight(0.3);
 }

@@ -91,6 +91,9 @@ pub(crate) struct WideSlab {
 }
 
 impl WideSlab {
+    /// The part of a distance by which it is widened.
+    pub(super) const PAD: f64 = gamma(6);
+
     pub fn new(ray: &PreparedRay) -> Self {
         WideSlab {
             origin: wide(ray.given.origin),
@@ -101,7 +104,6 @@ impl WideSlab {
 
     /// The part of the ray inside `[lower, upper]` with `t <= t_bound`.
     pub fn clip(&self, lower: DVec3, upper: DVec3, t_bound: f64) -> Interval<f64> {
-        const PAD: f64 = gamma(6);
         let mut near = f64::NEG_INFINITY;
         let mut far = f64::INFINITY;
         for k in 0..3 {
@@ -114,8 +116,8 @@ impl WideSlab {
             far = if leave < far { leave } else { far };
         }
         // An infinite distance stays infinite: only its finite part is widened.
-        near -= near.abs().min(f64::MAX) * PAD;
-        far += far.abs().min(f64::MAX) * PAD;
+        near -= near.abs().min(f64::MAX) * Self::PAD;
+        far += far.abs().min(f64::MAX) * Self::PAD;
         Interval {
             near: if near > self.t_min { near } else { self.t_min },
             far: if far < t_bound { far } else { t_bound },
