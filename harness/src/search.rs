@@ -26,7 +26,7 @@ impl Worst {
         let ratio = if error == 0.0 { 0.0 } else { error.abs() / bound };
         // A NaN is too much, and stays.
         self.ratio = if self.ratio <= ratio || ratio.is_nan() { ratio } else { self.ratio };
-        !(ratio <= 1.0)
+        ratio.is_nan() || ratio > 1.0
     }
 
     /// Prints a line of the table, and asserts that the bound held and is not far too wide.

@@ -115,8 +115,8 @@ impl<F: Real> Steps<F> {
             // grid around its contents covers.
             far: F::near(part.far),
         };
-        for k in 0..3 {
-            if !direction[k].is_zero() {
+        for (k, d) in direction.into_iter().enumerate() {
+            if !d.is_zero() {
                 steps.t_next[k] = steps.next_wall(k);
             }
         }

@@ -119,7 +119,6 @@ fn limited(ray: &PreparedRay, t: f32) -> f32 {
 }
 
 /// `t` between the limits; NaN becomes the lower one.
-#[expect(clippy::manual_clamp, reason = "`clamp` keeps a NaN, which would lose every comparison")]
 fn limit(t: f32, t_min: f32, t_max: f32) -> f32 {
     t.max(t_min).min(t_max)
 }
