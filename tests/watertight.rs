@@ -128,6 +128,34 @@ fn odd_scenes_are_never_missed() {
     }
 }
 
+/// Nothing stands behind a single triangle or sphere: what is missed at its edge is missed.
+#[test]
+fn single_primitives_are_never_missed() {
+    const FAMILIES: [Family; 5] = [
+        Family::AtVertex,
+        Family::AtEdge,
+        Family::ThroughVertex,
+        Family::FromVertex,
+        Family::Limited,
+    ];
+    let mut seen = Seen::default();
+    for seed in 0..400 {
+        let triangle = make::soup(1, seed).into();
+        let model = if seed % 4 == 0 { make::spheres(1, seed) } else { triangle };
+        let all = All::of(&model);
+        for family in FAMILIES {
+            for ray in RayMaker::new(&model, seed).many(family, 20) {
+                let from = ray.origin.iter().fold(reach(&model), |m, x| f64::from(x.abs()).max(m));
+                let (_, accel) = all.accels()[seed as usize % 3];
+                compare(&model, &accel, &ray, from, &mut seen);
+            }
+        }
+    }
+    println!("{seen:?}");
+    assert_eq!((seen.misses, seen.far), (0, 0));
+    assert!(seen.hits > 5_000);
+}
+
 /// Scenes at the ends of the range of floats.
 #[test]
 fn scenes_of_any_size_are_never_missed() {
