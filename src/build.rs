@@ -140,7 +140,7 @@ impl<'s, 'a> Job<'s, 'a> {
 
     fn run<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
         let Memory { size, minimum, alignment } = self.memory;
-        if memory.as_ptr().addr() % alignment != 0 {
+        if !memory.as_ptr().addr().is_multiple_of(alignment) {
             return Err(BuildError::Misaligned);
         }
         if memory.len() < minimum {

@@ -15,8 +15,9 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("exact", &["math"]),
     ("ray", &["exact", "math", "simd"]),
     ("block", &["error", "math", "storage"]),
-    ("sieve", &["block", "math", "ray", "simd"]),
     ("interval", &["exact", "math"]),
+    // The tests of its bounds judge by `interval` and `exact`.
+    ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
     ("query", &["block", "exact", "interval", "ray", "sieve"]),
     ("prim", &["block", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"]),
     ("list", &["block", "error", "prim", "scene"]),

@@ -100,6 +100,28 @@ fn a_teapot_in_a_stadium() {
     assert_eq!(down(6e5, 0.0), None);
 }
 
+/// Cells so small against the coordinates that `t` underflows `f32` while a ray crosses them.
+#[test]
+fn a_speck_far_from_zero() {
+    for (height, size) in [(1e38, 1e-40), (1e38, 1e-30), (1e30, 1e-10), (1e30, 1e14), (1e6, 1e-6)] {
+        let model: Model = make::plane(500).placed(size, [0.0, 0.0, height]).into();
+        let all = All::of(&model);
+        let mut hits = 0;
+        for i in 0..400 {
+            let [x, y] = [i % 20, i / 20].map(|i| ((f64::from(i) / 19.0 - 0.1) * size) as f32);
+            for direction in
+                [[1.0, 0.5, 1.0], [-1.0, 0.25, -2.0], [0.0, 0.0, 1.0], [1e-3, 1.0, -1e-9]]
+            {
+                let ray = Ray::new([x, y, height as f32], direction);
+                hits += usize::from(ask(&all, ray).is_some());
+                let above = Ray::new([x, y, (height as f32).next_up()], DOWN);
+                hits += usize::from(ask(&all, above).is_some());
+            }
+        }
+        assert!(hits > 400, "{height} {size}: {hits}");
+    }
+}
+
 /// No panic, no hang, and agreement: all families over odd scenes at extreme scales.
 #[test]
 fn extreme_scales() {

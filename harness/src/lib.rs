@@ -8,6 +8,7 @@ pub mod oracle;
 pub mod rays;
 pub mod render;
 pub mod scenes;
+pub mod search;
 pub mod shared_scenes;
 pub mod stats;
 pub mod stress;

@@ -56,7 +56,7 @@ unsafe fn accel_at<'m>(accel: *const RtAccel) -> Result<Accel<'m>, Error> {
     if accel.is_null() {
         return Err(Error::NullPointer);
     }
-    if accel.addr() % ALIGNMENT != 0 {
+    if !accel.addr().is_multiple_of(ALIGNMENT) {
         return Err(Error::Misaligned);
     }
     // SAFETY: not null, aligned, and a block as the caller promises.

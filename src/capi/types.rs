@@ -32,8 +32,14 @@ pub const RT_PLAIN_LIST_ALWAYS: u32 = 2;
 /// `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
 /// same answer from every structure; `t` is the nearest float.
 pub const RT_PRECISION_EXACT: u32 = 0;
-/// In single precision: nothing that the ray hits is missed, so no ray slips through a closed mesh;
-/// `t` is within a bound that docs/METHODS.md states; structures may differ in what they answer.
+/// In single precision. Nothing is missed: if the ray meets a triangle or a sphere within its limits
+/// in real arithmetic, the answer is a hit, for any finite input. More may be hit than is there, but
+/// only what the ray passes within a few roundings; a ray in a triangle's plane counts as meeting it.
+/// `t` is within the limits and, for a triangle, within the depths of its vertices;
+/// docs/METHODS.md states all bounds. One block gives the same bits on every processor; different
+/// structures may differ. The side of a triangle seen edge-on is a guess, which RT_FACING_FRONT and
+/// RT_FACING_BACK may then miss; likewise which root of a sphere is skipped when both are equally
+/// near.
 pub const RT_PRECISION_WATERTIGHT: u32 = 1;
 
 /// `RtQuery.facing`: both sides of every surface.

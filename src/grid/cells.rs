@@ -36,9 +36,10 @@ impl CellRay {
     /// Whether steps in `F` err by less than the dilation.
     ///
     /// With `C` the extent, a coordinate of the walk is off by at most `6 u C`, see [`Steps`](super::steps::Steps).
-    /// Granted are 8, for the rounding of origin, walls and insertion in `f64`.
+    /// Granted are 8, for what inserting in `f64` is off.
     pub fn steps_safely<F: Real>(&self) -> bool {
         8.0 * F::UNIT * self.extent() <= DILATION
+            && self.direction[self.major()].abs() <= F::FASTEST
     }
 
     /// The fastest axis.

@@ -1,5 +1,7 @@
 //! A regular grid in flat arrays: which cells a box reaches, and which a ray.
 
+#[cfg(test)]
+mod bounds;
 mod build;
 mod cells;
 mod plan;

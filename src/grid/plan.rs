@@ -21,6 +21,10 @@ const REFERENCES_AT_LEAST: u64 = 4096;
 /// would make stepping unsafe for rays that start a few thousand widths away.
 const FLAT: f64 = 1.0 / 4096.0;
 
+/// The least thickness of a flat axis, as a part of its coordinate: less than a unit of `f32`, much
+/// more than one of `f64`. Cells of other axes are never smaller than 2^-34 of theirs.
+const THICK: f64 = 1.0 / (1u64 << 32) as f64;
+
 /// A grid that was not built yet.
 pub(crate) struct Plan {
     pub head: GridHead,
@@ -55,7 +59,9 @@ impl GridHead {
         for k in 0..3 {
             let flat = extent[k] < widest * FLAT;
             let cells = if flat { 1 } else { n };
-            let cell = if flat { widest } else { extent[k] } / f64::from(n);
+            // Far from zero a flat axis is made so thick that rounding its walls takes nothing of note.
+            let flat_cell = (widest / f64::from(n)).max(lower[k].abs() * THICK);
+            let cell = if flat { flat_cell } else { extent[k] / f64::from(n) };
             let margin = if flat { cell / 2.0 } else { 2.0 * DILATION * cell };
             head.lower[k] = lower[k] - margin;
             head.cell[k] = (extent[k] + 2.0 * margin) / f64::from(cells);

@@ -10,6 +10,8 @@ pub(super) trait Real: Copy + PartialOrd {
     /// A component this much slower than the fastest one stands still: it moves the ray by less than
     /// a rounding while it crosses the grid.
     const STANDSTILL: f64;
+    /// A ray that crosses more cells than this in one `t` does not step: its `t` would underflow.
+    const FASTEST: f64;
     const INFINITY: Self;
 
     /// The nearest number.
@@ -26,10 +28,11 @@ pub(super) trait Real: Copy + PartialOrd {
 }
 
 macro_rules! real {
-    ($float:ty, $standstill:expr) => {
+    ($float:ty, $standstill:expr, $fastest:expr) => {
         impl Real for $float {
             const UNIT: f64 = <$float>::EPSILON as f64 / 2.0;
             const STANDSTILL: f64 = $standstill;
+            const FASTEST: f64 = $fastest;
             const INFINITY: Self = <$float>::INFINITY;
 
             fn near(x: f64) -> Self {
@@ -64,18 +67,18 @@ macro_rules! real {
     };
 }
 
-real!(f32, 1.0 / (1u64 << 40) as f64);
-real!(f64, 1.0 / (1u64 << 62) as f64);
+real!(f32, 1.0 / (1u64 << 40) as f64, (1u128 << 100) as f64);
+real!(f64, 1.0 / (1u64 << 62) as f64, f64::MAX);
 
 /// Where the walk is.
 ///
 /// The `t` of a wall comes from its number, `(i - origin) / direction`, and never from adding up steps, so
 /// errors do not grow along the ray. At each real `t` the walk is in the cell whose walls have been
 /// passed by their computed `t`. With `C` the [extent](CellRay::extent) and `u` the unit: rounding the
-/// origin moves the ray by `u C`; a wall's `t` carries four roundings (component, reciprocal, difference,
-/// product), which move the point where it is passed by `4 u C`; and the cell at the start carries
-/// four of at most `C` (origin, component, product, sum). So a coordinate of the ray is off the
-/// cell of the walk by at most `6 u C`.
+/// origin moves the ray by `u C`, in `f64` by `2 u C`; a wall's `t` carries four roundings (component,
+/// reciprocal, difference, product), which move the point where it is passed by `4 u C`; and the cell
+/// at the start carries origin, component, `t`, product and sum. So a coordinate of the ray is off
+/// the cell of the walk by at most `6 u C`.
 ///
 /// Source: \[AW87\], in the form that takes `t` from the index.
 pub(super) struct Steps<F> {
@@ -86,7 +89,7 @@ pub(super) struct Steps<F> {
     forwards: [bool; 3],
     resolution: [u32; 3],
     /// The `t` of the next wall on each axis.
-    t_next: [F; 3],
+    pub t_next: [F; 3],
     /// Where the ray leaves the grid, or the bound at the start.
     far: F,
 }
@@ -112,8 +115,8 @@ impl<F: Real> Steps<F> {
             // grid around its contents covers.
             far: F::near(part.far),
         };
-        for k in 0..3 {
-            if !direction[k].is_zero() {
+        for (k, d) in direction.into_iter().enumerate() {
+            if !d.is_zero() {
                 steps.t_next[k] = steps.next_wall(k);
             }
         }

@@ -34,14 +34,8 @@ pub(crate) fn meet(line: &Line, centre: [f32; 3], radius: f32) -> Option<SphereM
     let (o, d) = (wide(line.origin), wide(line.direction));
     let r = f64::from(radius);
     let v = o - wide(centre);
-    let a = d.length_squared();
-    let b = v.dot(d);
-    let l = v - d * (b / a);
-    let (reach, near) = (sum_abs(v), sum_abs(l));
-    let discriminant = r * r - l.length_squared();
-    let unsure = 32.0 * UNIT * near * reach
-        + (16.0 * UNIT * reach) * (16.0 * UNIT * reach)
-        + 16.0 * UNIT * (near * near + r * r);
+    let (a, b, reach) = (d.length_squared(), v.dot(d), sum_abs(v));
+    let (discriminant, unsure) = discriminant(v, d, r);
     if discriminant < -unsure {
         return None;
     }
@@ -68,6 +62,16 @@ pub(crate) fn meet(line: &Line, centre: [f32; 3], radius: f32) -> Option<SphereM
         touches: false,
         exact: false,
     })
+}
+
+/// The square of half the chord, and what that may be off.
+pub(super) fn discriminant(v: DVec3, d: DVec3, r: f64) -> (f64, f64) {
+    let l = v - d * (v.dot(d) / d.length_squared());
+    let (reach, near) = (sum_abs(v), sum_abs(l));
+    let unsure = 32.0 * UNIT * near * reach
+        + (16.0 * UNIT * reach) * (16.0 * UNIT * reach)
+        + 16.0 * UNIT * (near * near + r * r);
+    (r * r - l.length_squared(), unsure)
 }
 
 /// The same, computed without error and rounded.

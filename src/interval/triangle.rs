@@ -31,11 +31,7 @@ pub(crate) struct TriangleMeeting {
 pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let [u, v, w] = volumes(line, triangle);
     let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-    let [a, b, c] = triangle.map(wide);
-    let [ra, rb, rc] = [a, b, c].map(|p| sum_abs(p - wide(line.origin)));
-    let side = sum_abs(b - a).max(sum_abs(c - b)).max(sum_abs(a - c));
-    let reach = ra.max(rb).max(rc);
-    let bound = gamma(10) * sum_abs(wide(line.direction)) * 2.0 * reach * side;
+    let bound = volume_error(line, triangle);
     if least < -bound && most > bound {
         return None;
     }
@@ -48,12 +44,21 @@ pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeti
 }
 
 /// Twice the volumes over the edges opposite to the second, the third and the first vertex.
-fn volumes(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 3] {
+pub(super) fn volumes(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = triangle.map(wide);
     let (o, d) = (wide(line.origin), wide(line.direction));
     let (ra, rb, rc) = (a - o, b - o, c - o);
     let edge = |p: DVec3, q: DVec3, pq: DVec3| d.dot((p + q).cross(pq));
     [edge(rc, ra, a - c), edge(ra, rb, b - a), edge(rb, rc, c - b)]
+}
+
+/// What they may be off.
+pub(super) fn volume_error(line: &Line, triangle: [[f32; 3]; 3]) -> f64 {
+    let [a, b, c] = triangle.map(wide);
+    let [ra, rb, rc] = [a, b, c].map(|p| sum_abs(p - wide(line.origin)));
+    let side = sum_abs(b - a).max(sum_abs(c - b)).max(sum_abs(a - c));
+    let reach = ra.max(rb).max(rc);
+    gamma(10) * sum_abs(wide(line.direction)) * 2.0 * reach * side
 }
 
 /// Whether all volumes that are not zero have one sign.

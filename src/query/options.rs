@@ -23,8 +23,22 @@ pub enum Precision {
     /// the same bits from every structure and on every machine.
     #[default]
     Exact,
-    /// In `f32`, for the last per cent of speed and for processors without `f64`: nothing that the ray
-    /// hits is missed, and `t` is within a stated bound.
+    /// In `f32` alone, for the last per cent of speed and for processors without `f64`.
+    ///
+    /// Nothing is missed: if the ray meets a triangle or a sphere within its limits in real arithmetic,
+    /// the answer is a hit, for any finite input and from every structure. More may be hit than is
+    /// there, but only what the ray passes within a few units of `f32` of its distance and extent: a
+    /// triangle if no edge has the ray farther outside its line than that, a sphere if the line is
+    /// that close to it. A ray in a triangle's plane counts as meeting it, and beside it too.
+    ///
+    /// `t` lies within the ray's limits; for a triangle it lies within the depths of its vertices
+    /// as well, and is as close to the real one as the angle allows. `docs/METHODS.md` states the
+    /// bounds. The smaller computed `t` wins.
+    ///
+    /// A block and a ray give the same bits on every processor, as no operation is fused; list, grid
+    /// and BVH over one scene may answer differently. The side of a triangle seen edge-on within
+    /// rounding is a guess, which [`Facing`] other than `Both` may then miss; likewise which root of a
+    /// sphere is the nearest, which `skip` leaves out, when both are equally near.
     Watertight,
 }
 

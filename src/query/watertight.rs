@@ -53,6 +53,9 @@ impl Decide for Watertight {
         _: &mut impl Watch,
     ) -> Option<WatertightMet> {
         let detail = sieve::detail(ray, lane.corners);
+        if detail.t + detail.t_error < ray.t_min || detail.t - detail.t_error > ray.t_max {
+            return None;
+        }
         Some(WatertightMet {
             t: limited(ray, detail.t),
             weights: detail.weights,
@@ -118,7 +121,6 @@ fn limited(ray: &PreparedRay, t: f32) -> f32 {
 }
 
 /// `t` between the limits; NaN becomes the lower one.
-#[expect(clippy::manual_clamp, reason = "`clamp` keeps a NaN, which would lose every comparison")]
 fn limit(t: f32, t_min: f32, t_max: f32) -> f32 {
     t.max(t_min).min(t_max)
 }

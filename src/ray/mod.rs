@@ -1,5 +1,7 @@
 //! Rays, hits, and what a traversal knows about a ray before it starts.
 
+#[cfg(test)]
+mod bounds;
 mod frame;
 mod slab;
 

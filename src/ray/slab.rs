@@ -32,9 +32,9 @@ pub(crate) trait Slab {
 /// With `r` the scaled reciprocal of a component, the distance to a wall is `wall * r - shift`, where
 /// `shift` holds `origin * r` and all that rounding may add. `docs/METHODS.md` derives the padding.
 pub(crate) struct NarrowSlab {
-    reciprocal: [f32; 3],
-    near_shift: [f32; 3],
-    far_shift: [f32; 3],
+    pub(super) reciprocal: [f32; 3],
+    pub(super) near_shift: [f32; 3],
+    pub(super) far_shift: [f32; 3],
     t_min: f32,
     /// For each axis the number of the wall through which the ray enters, and of the other.
     order: [[usize; 2]; 3],
@@ -123,11 +123,14 @@ impl Slab for NarrowSlab {
 pub(crate) struct WideSlab {
     origin: DVec3,
     /// The reciprocal of the direction in the frame, from given coordinates.
-    inverse: DVec3,
+    pub(super) inverse: DVec3,
     t_min: f64,
 }
 
 impl WideSlab {
+    /// The part of a distance by which it is widened.
+    pub(super) const PAD: f64 = gamma(6);
+
     pub fn new(ray: &PreparedRay) -> Self {
         WideSlab {
             origin: wide(ray.given.origin),
@@ -138,7 +141,6 @@ impl WideSlab {
 
     /// The part of the ray inside `[lower, upper]` with `t <= t_bound`.
     pub fn clip(&self, lower: DVec3, upper: DVec3, t_bound: f64) -> Interval<f64> {
-        const PAD: f64 = gamma(6);
         let mut near = f64::NEG_INFINITY;
         let mut far = f64::INFINITY;
         for k in 0..3 {
@@ -151,8 +153,8 @@ impl WideSlab {
             far = if leave < far { leave } else { far };
         }
         // An infinite distance stays infinite: only its finite part is widened.
-        near -= near.abs().min(f64::MAX) * PAD;
-        far += far.abs().min(f64::MAX) * PAD;
+        near -= near.abs().min(f64::MAX) * Self::PAD;
+        far += far.abs().min(f64::MAX) * Self::PAD;
         Interval {
             near: if near > self.t_min { near } else { self.t_min },
             far: if far < t_bound { far } else { t_bound },

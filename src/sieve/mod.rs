@@ -1,7 +1,10 @@
 //! The first look at the primitives of a leaf block, in `f32`: it only rejects.
 
+#[cfg(test)]
+mod bounds;
 mod sphere;
 mod triangle;
+mod vector;
 
 pub(crate) use sphere::{SphereDetail, sphere};
 pub(crate) use triangle::{Depths, detail, is_candidate, triangles};

@@ -1,19 +1,14 @@
 //! The filter of spheres, in `f32`: it rejects what the ray surely does not meet.
 
+use glam::Vec3;
+
+use super::vector::{dot, sum_abs};
 use crate::math::float::sqrt32;
 use crate::math::rounding::UNIT32;
 use crate::ray::PreparedRay;
 
 /// Far below every bound on squares in the frame, and far above what underflow can take away.
 const TINY: f32 = 1.0 / (1u128 << 100) as f32;
-
-fn sum_abs(v: [f32; 3]) -> f32 {
-    v[0].abs() + v[1].abs() + v[2].abs()
-}
-
-fn dot(p: [f32; 3], q: [f32; 3]) -> f32 {
-    p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-}
 
 /// One sphere in `f32`.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +19,37 @@ pub(crate) struct SphereDetail {
     pub t_error: f32,
     /// Whether the second of them is nearer to zero.
     pub far_is_nearest: bool,
+}
+
+/// Where the ray's line passes a sphere.
+pub(super) struct Chord {
+    /// From the centre to the origin.
+    v: Vec3,
+    /// `d . d` and `v . d`.
+    a: f32,
+    b: f32,
+    /// The `t` of the point nearest the centre.
+    pub middle: f32,
+    /// A bound on the length of `v`.
+    pub reach: f32,
+    /// The square of half the chord.
+    pub discriminant: f32,
+    /// What the discriminant may be off.
+    pub unsure: f32,
+}
+
+pub(super) fn chord(ray: &PreparedRay, centre: [f32; 3], r: f32) -> Chord {
+    let d = Vec3::from(ray.direction);
+    let v = Vec3::from(ray.origin) - Vec3::from(centre) * ray.scale;
+    let (a, b) = (dot(d, d), dot(v, d));
+    let middle = -(b / a);
+    let l = v + d * middle;
+    let (reach, near) = (sum_abs(v), sum_abs(l));
+    let unsure = 32.0 * UNIT32 * near * reach
+        + (16.0 * UNIT32 * reach) * (16.0 * UNIT32 * reach)
+        + 16.0 * UNIT32 * (near * near + r * r)
+        + TINY;
+    Chord { v, a, b, middle, reach, discriminant: r * r - dot(l, l), unsure }
 }
 
 /// What the filter knows of a sphere, unless the ray surely does not meet it within its limits and up to the
@@ -39,22 +65,13 @@ pub(crate) fn sphere(
     centre: [f32; 3],
     radius: f32,
 ) -> Option<SphereDetail> {
-    let (d, r) = (ray.direction, radius * ray.scale);
-    let v = [0, 1, 2].map(|k| ray.origin[k] - centre[k] * ray.scale);
-    let (a, b) = (dot(d, d), dot(v, d));
-    let middle = -(b / a);
-    let l = [0, 1, 2].map(|k| v[k] + d[k] * middle);
-    let (reach, near) = (sum_abs(v), sum_abs(l));
-    let unsure = 32.0 * UNIT32 * near * reach
-        + (16.0 * UNIT32 * reach) * (16.0 * UNIT32 * reach)
-        + 16.0 * UNIT32 * (near * near + r * r)
-        + TINY;
-    let discriminant = r * r - dot(l, l);
+    let r = radius * ray.scale;
+    let Chord { v, a, b, middle, reach, discriminant, unsure } = chord(ray, centre, r);
     if discriminant < -unsure {
         return None;
     }
     // The line is inside for at most the radius on either side, as the direction is at least 1 long.
-    let half = r * (1.0 + 8.0 * UNIT32) + 32.0 * UNIT32 * (reach + r);
+    let half = r * (1.0 + 8.0 * UNIT32) + 32.0 * UNIT32 * (reach + r) + TINY;
     if middle - half > t_bound || middle + half < ray.t_min {
         return None;
     }
@@ -69,7 +86,7 @@ pub(crate) fn sphere(
     let small = small.max(middle - half).min(middle + half);
     // Infinite where the line touches the sphere at its origin.
     let from_power = 16.0 * UNIT32 * (reach * reach + r * r) / q.abs();
-    let t_error = (most - least) + 64.0 * UNIT32 * (reach + r) + from_power;
+    let t_error = (most - least) + 64.0 * UNIT32 * (reach + r) + from_power + TINY;
     Some(SphereDetail {
         t: if large < small { [large, small] } else { [small, large] },
         t_error,

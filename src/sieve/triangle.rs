@@ -1,5 +1,8 @@
 //! The filter of triangles, in `f32`: it rejects what the ray surely does not meet.
 
+use glam::Vec3;
+
+use super::vector::{cross, dot, sum_abs};
 use crate::block::leaf::TriangleBlock;
 use crate::math::rounding::UNIT32;
 use crate::ray::PreparedRay;
@@ -23,13 +26,15 @@ pub(crate) struct Depths {
 impl Depths {
     #[inline(always)]
     pub fn new(ray: &PreparedRay, t_bound: f32) -> Self {
-        // A product rounds once; infinite depths stay as they are.
+        // A product rounds once. Infinite depths stay as they are: only their finite part is widened.
         let rate = ray.shear.depth_rate;
-        let lower = |t: f32| t * rate - (t * rate).abs() * (4.0 * UNIT32);
-        let upper = |t: f32| t * rate + (t * rate).abs() * (4.0 * UNIT32);
+        let slack = |t: f32| (t * rate).abs().min(f32::MAX) * (4.0 * UNIT32);
+        let lower = |t: f32| t * rate - slack(t);
+        let upper = |t: f32| t * rate + slack(t);
         Depths {
-            low: lower(ray.t_min),
-            high: upper(t_bound),
+            // Depths of vertices are off by what scaling to the frame took below its least float.
+            low: lower(ray.t_min) - TINY,
+            high: upper(t_bound) + TINY,
             inside: [upper(ray.t_inside[0]), lower(ray.t_inside[1])],
         }
     }
@@ -106,6 +111,40 @@ fn corners<S: Simd>(
     }
 }
 
+/// What x and y of a vertex may be off, when none is larger than `size` and no depth than `deepest`.
+#[inline(always)]
+fn coordinate_error<S: Width<N>, const N: usize>(
+    s: S,
+    size: S::V,
+    steepness: f32,
+    deepest: S::V,
+) -> S::V {
+    let of_depth = deepest.mul(s.splat(5.5 * UNIT32 * steepness));
+    size.mul(s.splat(2.5 * UNIT32)).add(of_depth)
+}
+
+/// What an area may be off, when coordinates are off by `shift`.
+#[inline(always)]
+fn area_error<S: Width<N>, const N: usize>(s: S, shift: S::V, size: S::V) -> S::V {
+    let of_shift = shift.mul(size.mul(s.splat(4.0)).add(shift.mul(s.splat(2.0))));
+    of_shift.add(size.mul(size).mul(s.splat(4.5 * UNIT32))).add(s.splat(TINY))
+}
+
+/// What `rise` may be off the depth of the meeting times the total area, and what the comparison of
+/// both with a limit may be off, even if the total has the wrong sign.
+#[inline(always)]
+fn rise_error<S: Width<N>, const N: usize>(
+    s: S,
+    area_error: S::V,
+    span: S::V,
+    depth: S::V,
+    size_of_total: S::V,
+) -> S::V {
+    let of_areas = area_error.mul(span.mul(s.splat(20.0)));
+    let of_depth = depth.abs().add(span).mul(size_of_total).mul(s.splat(5.0 * UNIT32));
+    of_areas.add(of_depth).add(s.splat(TINY))
+}
+
 /// What the filter computes of each lane.
 struct Sieved<V> {
     /// Lanes that the ray surely does not meet within its limits and up to the bound.
@@ -150,14 +189,8 @@ fn sieve<S: Width<N>, const N: usize>(
     let (over_a, over_b, over_c) = (b.area(&c), c.area(&a), a.area(&b));
     let size = a.size().max(b.size()).max(c.size());
     let deepest = nearest_depth.abs().max(farthest_depth.abs());
-    // The error of a coordinate, and that of an area.
-    let shift = size
-        .mul(s.splat(2.5 * UNIT32))
-        .add(deepest.mul(s.splat(5.5 * UNIT32 * ray.shear.steepness)));
-    let area_error = shift
-        .mul(size.mul(s.splat(4.0)).add(shift.mul(s.splat(2.0))))
-        .add(size.mul(size).mul(s.splat(4.5 * UNIT32)))
-        .add(s.splat(TINY));
+    let shift = coordinate_error(s, size, ray.shear.steepness, deepest);
+    let area_error = area_error(s, shift, size);
     let minus_error = s.splat(0.0).sub(area_error);
     let least = over_a.min(over_b).min(over_c);
     let most = over_a.max(over_b).max(over_c);
@@ -168,10 +201,7 @@ fn sieve<S: Width<N>, const N: usize>(
     let (to_b, to_c) = (b.raw.sub(a.raw), c.raw.sub(a.raw));
     let rise = over_b.mul(to_b).add(over_c.mul(to_c)).flipped_by(total);
     let span = to_b.abs().max(to_c.abs());
-    let error = area_error
-        .mul(span.mul(s.splat(20.0)))
-        .add(a.depth.abs().add(span).mul(size_of_total).mul(s.splat(5.0 * UNIT32)))
-        .add(s.splat(TINY));
+    let error = rise_error(s, area_error, span, a.depth, size_of_total);
     let minus_error = s.splat(0.0).sub(error);
     // Positive where the meeting is beyond that depth.
     let past_high = rise.sub(high.sub(a.depth).mul(size_of_total));
@@ -243,6 +273,8 @@ fn few(ray: &PreparedRay, depths: &Depths, block: &TriangleBlock, lanes: u32) ->
 pub(crate) struct TriangleDetail {
     /// The frame's `t`, between those of the nearest and the farthest vertex.
     pub t: f32,
+    /// What it may be off; infinite where the triangle is seen edge-on.
+    pub t_error: f32,
     /// Weights of the second and the third vertex.
     pub weights: [f32; 2],
     /// Whether the line meets the front, where rounding leaves no doubt.
@@ -278,9 +310,90 @@ pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetai
     let is_clear = total.abs() > 6.0 * area_error;
     // A NaN, from 0 / 0, loses to the depths of the vertices.
     let depth = (first + rise / total.abs()).max(nearest).min(farthest);
+    let rate = ray.shear.depth_rate;
+    let (t, t_error) = match plane(ray, corners) {
+        Some((t, t_error)) => ((t * rate).max(nearest).min(farthest) / rate, t_error),
+        None => (depth / rate, f32::INFINITY),
+    };
     TriangleDetail {
-        t: depth / ray.shear.depth_rate,
+        t,
+        t_error,
         weights: [over_b / total, over_c / total],
         front: is_clear.then_some((total < 0.0) == (ray.shear.depth_sign > 0.0)),
+    }
+}
+
+/// The frame's `t` at which the ray meets the plane of the triangle, and a bound on its error; `None` when
+/// they are nearly parallel.
+///
+/// Far tighter than what the areas give for a ray that starts on a large triangle: the error grows with the
+/// distance to the first vertex instead of with the triangle. The computation is that of
+/// [`interval`](crate::interval) with another unit, and its bounds.
+fn plane(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Option<(f32, f32)> {
+    let [a, b, c] = corners.map(|vertex| Vec3::from(vertex) * ray.scale);
+    let (e1, e2) = (b - a, c - a);
+    let n = cross(e1, e2);
+    let d = Vec3::from(ray.direction);
+    let to_plane = a - Vec3::from(ray.origin);
+    let along = dot(d, n);
+    let size = 8.5 * UNIT32 * sum_abs(e1) * sum_abs(e2);
+    let along_error = sum_abs(d) * size + TINY;
+    if !(4.0 * along_error < along.abs()) {
+        return None;
+    }
+    let t = dot(to_plane, n) / along;
+    // Half as much again for the divisor's own error, and a few roundings of the quotient and limits.
+    let error = (sum_abs(to_plane) * size + TINY + t.abs() * along_error) / along.abs();
+    Some((t, 1.5 * error + 8.0 * UNIT32 * t.abs()))
+}
+
+/// The pieces of the filter for one lane, for the tests of its bounds.
+#[cfg(test)]
+pub(super) mod single {
+    use super::{Depths, PreparedRay, Scalar, TriangleDetail};
+
+    pub struct Sheared {
+        pub x: f32,
+        pub y: f32,
+        pub raw: f32,
+        pub depth: f32,
+    }
+
+    pub fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
+        let super::Sheared { x: [x], y: [y], raw: [raw], depth: [depth] } =
+            super::Sheared::new(Scalar, ray, &vertex.map(|x| [x]));
+        Sheared { x, y, raw, depth }
+    }
+
+    pub fn area(p: &Sheared, q: &Sheared) -> f32 {
+        p.x * q.y - p.y * q.x
+    }
+
+    pub fn coordinate_error(size: f32, steepness: f32, deepest: f32) -> f32 {
+        super::coordinate_error(Scalar, [size], steepness, [deepest])[0]
+    }
+
+    pub fn area_error(shift: f32, size: f32) -> f32 {
+        super::area_error(Scalar, [shift], [size])[0]
+    }
+
+    pub fn rise_error(area_error: f32, span: f32, depth: f32, size_of_total: f32) -> f32 {
+        super::rise_error(Scalar, [area_error], [span], [depth], [size_of_total])[0]
+    }
+
+    #[derive(Clone, Copy, Debug)]
+    pub struct Sieved {
+        pub sure: bool,
+        pub inside: bool,
+        pub detail: TriangleDetail,
+    }
+
+    pub fn sieve(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> Option<Sieved> {
+        let sieved = super::sieve_one(ray, depths, corners);
+        (sieved.rejected == 0).then(|| Sieved {
+            sure: sieved.sure == 1,
+            inside: sieved.inside == 1,
+            detail: super::detail(ray, corners),
+        })
     }
 }

@@ -1,5 +1,10 @@
 //! SSE2, AVX2 with FMA, and AVX-512.
 
+#![allow(
+    clippy::multiple_unsafe_ops_per_block,
+    reason = "one proof covers all instructions of an operation"
+)]
+
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 

@@ -36,6 +36,20 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
+    /// A float of either sign whose exponent is anything from `low` to `high`, subnormals included;
+    /// now and then a power of two or zero.
+    pub fn wild(&mut self, [low, high]: [i32; 2]) -> f32 {
+        let exponent = low + self.below((high - low + 1) as usize) as i32;
+        let bits = self.bits();
+        let fraction = match bits >> 60 {
+            0 => return 0.0,
+            1 => 0.0,
+            _ => (bits >> 8 & 0x7f_ffff) as f64 / f64::from(1 << 23),
+        };
+        let sign = if bits & 1 == 0 { 1.0 } else { -1.0 };
+        (sign * (1.0 + fraction) * 2f64.powi(exponent)) as f32
+    }
+
     /// A point in the cube `low .. high`.
     pub fn point(&mut self, low: f64, high: f64) -> [f64; 3] {
         std::array::from_fn(|_| self.between(low, high))

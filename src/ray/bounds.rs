@@ -1,0 +1,136 @@
+//! The padding of boxes: a search for what breaks it, and how much of it is used.
+
+use std::println;
+
+use raykern_harness::make::Random;
+use raykern_harness::oracle::dyadic::Dyadic;
+use raykern_harness::search::{Worst, samples};
+
+use super::{NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
+use crate::math::rounding::{f32_above, f32_below};
+use crate::math::{Aabb, wide};
+
+const RANGES: [[i32; 2]; 5] = [[-149, 127], [-149, -120], [60, 127], [-20, 20], [-2, 2]];
+
+/// A ray and how far its scene reaches.
+fn ray(random: &mut Random) -> Option<(PreparedRay, f32)> {
+    let range = RANGES[random.below(RANGES.len())];
+    let origin = [0, 1, 2].map(|_| random.wild(range));
+    let mut direction = [0, 1, 2].map(|_| random.wild([-4, 4]));
+    let k = random.below(3);
+    match random.below(4) {
+        0 => direction[k] = [0.0, -0.0][random.below(2)],
+        1 => direction[k] = random.wild([-149, 4]),
+        _ => {}
+    }
+    let length = 2f32.powi(random.below(200) as i32 - 100);
+    let ray = Ray::new(origin, direction.map(|x| x * length));
+    let reach = random.wild(range).abs();
+    let reach = if random.below(2) == 0 { reach } else { 0.0 };
+    let ray = ray.with_limits(f32::NEG_INFINITY, f32::INFINITY).prepare(reach)?;
+    let reach = ray.given.origin.iter().fold(reach, |m, x| m.max(x.abs()));
+    Some((ray, reach))
+}
+
+/// A wall within reach, of any exponent.
+fn wall(random: &mut Random, reach: f32) -> f32 {
+    let part = random.unit() as f32 * 2f32.powi(-(random.below(30) as i32));
+    if random.below(2) == 0 { reach * part } else { -reach * part }
+}
+
+/// The distances to walls, against an `f64` computation.
+fn see_walls(random: &mut Random, ray: &PreparedRay, reach: f32, worst: &mut Worst) -> bool {
+    let Some(slab) = NarrowSlab::new(ray) else { return true };
+    let k = random.below(3);
+    let d = f64::from(ray.given.direction[k]);
+    if d == 0.0 {
+        return true;
+    }
+    let wall = wall(random, reach);
+    let real = (f64::from(wall) - f64::from(ray.given.origin[k])) / d * ray.t_scale;
+    // Where there can be no hit, the distance only has to stay on its side.
+    if real.abs() > 2.0 * f64::from(ray.reach) {
+        return true;
+    }
+    let product = wall * slab.reciprocal[k];
+    let (near, far) = (product - slab.near_shift[k], product - slab.far_shift[k]);
+    let pad = (f64::from(slab.near_shift[k]) - f64::from(slab.far_shift[k])) / 2.0;
+    worst.see(f64::from(near) + pad - real, pad);
+    worst.see(f64::from(far) - pad - real, pad);
+    f64::from(near) <= real && real <= f64::from(far)
+}
+
+/// Boxes around a point of the ray, as small as floats allow or thick: both slabs must hold its `t`.
+fn boxes_hold(random: &mut Random, ray: &PreparedRay, reach: f32) -> bool {
+    let fastest = (0..3).map(|k| ray.given.direction[k].abs()).fold(0.0, f32::max);
+    let t = f64::from(reach) / f64::from(fastest) * random.between(-2.0, 2.0);
+    let t = t * 2f64.powi(-(random.below(40) as i32));
+    if t == 0.0 || !(t.abs() < f64::from(f32::MAX)) {
+        return true;
+    }
+    let (o, d) = (wide(ray.given.origin), wide(ray.given.direction));
+    let mut aabb = Aabb::EMPTY;
+    for k in 0..3 {
+        let step = d[k] * t;
+        let off = (o[k].abs() + step.abs()) * 2f64.powi(-51);
+        // A component of zero leaves the point where it is.
+        let off = if step == 0.0 { 0.0 } else { off };
+        let thick = [0.0, f64::from(reach) * random.unit()];
+        aabb.lower[k] = f32_below(o[k] + step - off - thick[random.below(2)]);
+        aabb.upper[k] = f32_above(o[k] + step + off + thick[random.below(2)]);
+    }
+    if aabb.reach() > reach {
+        return true;
+    }
+    let t = t * ray.t_scale;
+    let holds = |slab: &dyn Fn(f32) -> super::Interval<f32>| {
+        let bound = f32_above(t);
+        [bound, ray.t_max].into_iter().all(|bound| {
+            let part = slab(bound);
+            f64::from(part.near) <= t && t <= f64::from(part.far)
+        })
+    };
+    let narrow = NarrowSlab::new(ray);
+    holds(&|bound| WideSlab::new(ray).part(&aabb, bound))
+        && narrow.is_none_or(|slab| holds(&|bound| slab.part(&aabb, bound)))
+}
+
+#[test]
+fn narrow_boxes() {
+    const SEED: u64 = 21;
+    println!("seed {SEED}");
+    let mut random = Random::new(SEED);
+    let mut worst = Worst::new("box, f32: distance of a wall");
+    for sample in 0..samples(1_500_000) {
+        let before = random.clone();
+        let Some((ray, reach)) = ray(&mut random) else { continue };
+        let right = see_walls(&mut random, &ray, reach, &mut worst);
+        assert!(right, "wall, sample {sample} of seed {SEED}: {before:?}");
+        let right = boxes_hold(&mut random, &ray, reach);
+        assert!(right, "box, sample {sample} of seed {SEED}: {before:?}");
+    }
+    worst.assert_tight(0.3);
+}
+
+/// `(wall - o) * inverse` against the quotient, without error: `x d` against `(wall - o) t_scale`.
+#[test]
+fn wide_boxes() {
+    const SEED: u64 = 22;
+    println!("seed {SEED}");
+    let mut random = Random::new(SEED);
+    let mut worst = Worst::new("box, f64: distance of a wall");
+    for _ in 0..samples(100_000) {
+        let Some((ray, reach)) = ray(&mut random) else { continue };
+        let (k, wall) = (random.below(3), wall(&mut random, reach));
+        let (o, d) = (ray.given.origin[k], ray.given.direction[k]);
+        if d == 0.0 || wall == o {
+            continue;
+        }
+        let x = (f64::from(wall) - f64::from(o)) * WideSlab::new(&ray).inverse[k];
+        let real = &Dyadic::from_f32(wall) - &Dyadic::from_f32(o);
+        let real = &real * &Dyadic::from_f64(ray.t_scale);
+        let product = &Dyadic::from_f64(x) * &Dyadic::from_f32(d);
+        worst.see((&product - &real).ratio(&product), WideSlab::PAD);
+    }
+    worst.assert_tight(0.3);
+}
