@@ -108,6 +108,8 @@ impl Lineup {
         }
         #[cfg(feature = "embree")]
         crate::embree::join(&mut lineup, model, options);
+        #[cfg(feature = "peers")]
+        crate::peers::join(&mut lineup, model, options);
         Ok(lineup)
     }
 

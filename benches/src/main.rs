@@ -11,6 +11,8 @@ mod lineup;
 mod measure;
 mod options;
 mod ours;
+#[cfg(feature = "peers")]
+mod peers;
 mod ratios;
 mod rays;
 mod report;
