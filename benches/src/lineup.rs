@@ -18,6 +18,10 @@ pub trait Tracer {
 
 /// What kind of method a subject is: with what it is compared, and how right it must be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(
+    not(all(feature = "embree", feature = "peers")),
+    allow(dead_code, reason = "peers that are left out are named all the same")
+)]
 pub enum Class {
     /// Our BVH, one ray at a time.
     Single(Precision),

@@ -88,12 +88,13 @@ pub fn measure(
         hold_against_list(&list.accel(), &rays, &right)?;
         let methods = take_turns(&lineup.subjects, kind, &rays, &right, options, watch);
         for (subject, method) in lineup.subjects.iter().zip(&methods) {
+            let allowed = allowed_to_differ(subject.class, rays.len(), options.quick);
             ensure!(
-                !subject.class.is_exact() || method.differing == 0,
-                "{}: {} differs from the reference on {} {} rays",
-                case.name,
+                method.differing <= allowed,
+                "{} answers {} of {} {} rays unlike our exact BVH",
                 subject.name,
                 method.differing,
+                rays.len(),
                 kind.name()
             );
         }
@@ -108,6 +109,16 @@ pub fn measure(
         kinds,
         notes: lineup.notes,
     })
+}
+
+/// How many answers may differ. Peers are counted, not judged, but in a quick run, whose scenes are
+/// known: more than a few would mean that like is not compared with like.
+fn allowed_to_differ(class: Class, rays: usize, quick: bool) -> usize {
+    match () {
+        () if class.is_exact() => 0,
+        () if class.is_ours() || !quick => usize::MAX,
+        () => rays / 100,
+    }
 }
 
 /// A method this many times slower than the first on a sample of the rays is left out.
@@ -162,4 +173,33 @@ fn trace(subject: &Subject, kind: Kind, rays: &[Ray], watch: &mut Watch) -> (Ans
         Answers::Occluded(occluded) => subject.tracer.any(rays, occluded, coherent, watch),
     }
     (answers, watch.take())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::scenes::cases;
+
+    #[test]
+    fn small_scenes_are_measured_and_all_of_ours_agree() {
+        let options = Options::parse_from(["", "--quick", "--rays", "300", "--runs", "2"]);
+        for case in cases(&options) {
+            let scene = case.load(&options).expect("a generated scene");
+            let result = measure(&case, &scene, &options, &mut Watch::new()).expect("a result");
+            assert_eq!(result.kinds.len(), Kind::ALL.len());
+            for kind in &result.kinds {
+                assert_eq!((kind.rays, kind.methods.len()), (300, result.subjects.len()));
+                assert!(kind.methods.iter().all(|method| method.runs.len() == 2));
+            }
+        }
+    }
+
+    #[test]
+    fn peers_are_judged_in_quick_runs_alone() {
+        let allowed = |class, quick| allowed_to_differ(class, 500, quick);
+        assert_eq!((allowed(Class::Embree, true), allowed(Class::Noise, true)), (5, 0));
+        assert_eq!(allowed(Class::Embree, false), usize::MAX);
+    }
 }

@@ -80,6 +80,7 @@ impl Options {
     }
 
     /// Whether a peer takes part.
+    #[cfg(any(feature = "embree", feature = "peers"))]
     pub fn wants_peer(&self, name: &str) -> bool {
         self.peers.is_empty() || begins_with_one(name, &self.peers)
     }

@@ -225,3 +225,37 @@ fn wide(v: [f32; 3]) -> DVec3 {
 fn narrow(v: DVec3) -> [f32; 3] {
     v.to_array().map(|x| x as f32)
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use raykern::Layout;
+
+    use super::*;
+    use crate::options::Options;
+    use crate::ours::bvh;
+    use crate::scenes::cases;
+
+    #[test]
+    fn every_kind_has_all_its_rays_and_they_are_sound() {
+        let options =
+            Options::parse_from(["", "--quick", "--scene", "cave", "--scene", "architecture"]);
+        for case in cases(&options) {
+            let scene = case.load(&options).expect("a generated scene");
+            let built = bvh(&scene.model, Layout::Automatic).expect("a BVH");
+            let accel = built.accel();
+            let maker = RayMaker::new(&scene, &accel, 2_000);
+            for kind in Kind::ALL {
+                let rays = maker.make(kind);
+                assert_eq!(rays.len(), 2_000, "{}", kind.name());
+                let finite = |v: [f32; 3]| v.iter().all(|x| x.is_finite());
+                let sound = |r: &Ray| finite(r.origin) && finite(r.direction) && r.t_min == 0.0;
+                assert!(rays.iter().all(sound), "{}", kind.name());
+                assert_eq!(rays, maker.make(kind), "{}", kind.name());
+            }
+            let hits =
+                maker.make(Kind::Primary).iter().filter(|r| built.accel().occluded(r)).count();
+            assert!(hits > 1_000, "{hits}: the camera looks out of {}", case.name);
+        }
+    }
+}

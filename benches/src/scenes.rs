@@ -75,7 +75,9 @@ const QUICK_SCENES: [&str; 2] = ["sphere", "architecture"];
 /// The scenes that `options` asks for.
 pub fn cases(options: &Options) -> Vec<Case> {
     if options.growth {
-        return growth();
+        let mut cases = growth(if options.quick { 100_000 } else { 10_000_000 });
+        cases.retain(|case| options.names_scene(&case.name).unwrap_or(true));
+        return cases;
     }
     let made = MADE.iter().map(|&(name, make, triangles, view)| {
         let triangles = if options.quick { triangles / QUICK } else { triangles };
@@ -96,9 +98,10 @@ pub fn cases(options: &Options) -> Vec<Case> {
     [call].into_iter().chain(files).chain(made).filter(wanted).collect()
 }
 
-/// Spheres from a thousand to ten million triangles, about three to a factor of ten.
-fn growth() -> Vec<Case> {
+/// Spheres from a thousand triangles to `largest`, two to a factor of ten.
+fn growth(largest: usize) -> Vec<Case> {
     let sizes = (6..=14).map(|i| 10f64.powf(f64::from(i) / 2.0) as usize);
+    let sizes = sizes.filter(|&size| size <= largest);
     sizes.map(|n| made_outside(&format!("sphere_{n}"), |n| make::sphere(n).into(), n)).collect()
 }
 
