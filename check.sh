@@ -3,7 +3,7 @@
 # (Debian packages by name). Under 15 minutes on two cores.
 #
 #   ./check.sh            all of it
-#   ./check.sh STEP ...   some of it: format clippy build test docs header c fuzz embree stress compare
+#   ./check.sh STEP ...   some of it: format clippy build test docs header c fuzz embree stress compare bench
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
@@ -102,7 +102,10 @@ step_stress() {
 # The main job, cut short.
 step_compare() { cargo run --release --example compare -- --runs 2 --budget 20 --out target/compare-check; }
 
-steps=(install format clippy build test docs header c fuzz embree stress compare)
+# The comparison with Embree, cut short: its answers are checked, its times mean nothing here.
+step_bench() { cargo run --release -p raykern-bench --features embree -- --quick; }
+
+steps=(install format clippy build test docs header c fuzz embree stress compare bench)
 [ $# -eq 0 ] || steps=("$@")
 for step in "${steps[@]}"; do
     started=$SECONDS

@@ -1,0 +1,13 @@
+//! Compiles the C side of the comparison with Embree.
+
+fn main() {
+    println!("cargo::rerun-if-changed=embree.c");
+    println!("cargo::rerun-if-changed=embree.h");
+    #[cfg(feature = "embree")]
+    {
+        let mut build = cc::Build::new();
+        build.file("embree.c").std("c11").opt_level(3).warnings(true).extra_warnings(true);
+        build.compile("bench_embree");
+        println!("cargo::rustc-link-lib=embree3");
+    }
+}

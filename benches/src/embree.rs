@@ -1,0 +1,237 @@
+//! Embree 3 through the shim in `embree.c`.
+
+use std::ffi::{CStr, c_char, c_int};
+use std::rc::Rc;
+
+use raykern::{Hit, Ray};
+use raykern_harness::model::Model;
+
+use crate::lineup::{Class, Lineup, Tracer};
+use crate::options::Options;
+use crate::watch::{Watch, timed_build};
+
+/// An opaque `BenchEmbree`.
+#[repr(C)]
+struct RawScene([u8; 0]);
+/// An opaque `BenchBatch`.
+#[repr(C)]
+struct RawBatch([u8; 0]);
+
+unsafe extern "C" {
+    fn bench_embree_new(config: *const c_char, quality: c_int, robust: c_int) -> *mut RawScene;
+    fn bench_embree_mesh(
+        scene: *mut RawScene,
+        vertices: *const f32,
+        vertex_count: usize,
+        indices: *const u32,
+        triangle_count: usize,
+    ) -> c_int;
+    fn bench_embree_commit(scene: *mut RawScene) -> c_int;
+    fn bench_embree_bytes(scene: *const RawScene) -> usize;
+    fn bench_embree_free(scene: *mut RawScene);
+    fn bench_embree_closest(scene: *mut RawScene, rays: *const Ray, hits: *mut Hit, count: usize);
+    fn bench_embree_any(scene: *mut RawScene, rays: *const Ray, occluded: *mut u8, count: usize);
+    fn bench_batch_new(rays: *const Ray, count: usize, width: c_int, any: c_int) -> *mut RawBatch;
+    fn bench_batch_run(scene: *mut RawScene, batch: *mut RawBatch, coherent: c_int);
+    fn bench_batch_hits(batch: *const RawBatch, hits: *mut Hit);
+    fn bench_batch_occluded(batch: *const RawBatch, occluded: *mut u8);
+    fn bench_batch_free(batch: *mut RawBatch);
+}
+
+/// How a scene is built.
+struct Setup {
+    name: &'static str,
+    quality: c_int,
+    robust: bool,
+    single: Class,
+    /// The class of packets and streams; `None` to leave them out.
+    batch: Option<Class>,
+}
+
+const SETUPS: [Setup; 4] = [
+    Setup {
+        name: "embree",
+        quality: 1,
+        robust: false,
+        single: Class::Embree,
+        batch: Some(Class::EmbreeBatch),
+    },
+    Setup {
+        name: "embree-robust",
+        quality: 1,
+        robust: true,
+        single: Class::EmbreeRobust,
+        batch: Some(Class::EmbreeRobustBatch),
+    },
+    Setup {
+        name: "embree-high",
+        quality: 2,
+        robust: false,
+        single: Class::EmbreeHigh,
+        batch: None,
+    },
+    Setup { name: "embree-low", quality: 0, robust: false, single: Class::EmbreeLow, batch: None },
+];
+
+/// What follows the name, and the device's settings. On some processors Embree is faster without
+/// the widest vectors.
+const DEVICES: [(&str, &CStr); 2] = [("", c""), ("-avx2", c"isa=avx2")];
+
+/// Adds every setup on every device.
+pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) {
+    for setup in &SETUPS {
+        for (suffix, config) in DEVICES {
+            let name = format!("{}{suffix}", setup.name);
+            if !options.wants_peer(&name) {
+                continue;
+            }
+            let (scene, seconds) = timed_scene(model, config, setup);
+            let Some(scene) = scene else {
+                lineup.notes.push(format!("{name}: Embree refused"));
+                continue;
+            };
+            lineup.built(&name, seconds, Some(scene.bytes()));
+            let scene = Rc::new(scene);
+            if let Some(class) = setup.batch {
+                add_batches(lineup, &name, class, &scene);
+            }
+            lineup.add(name, setup.single, Single(scene));
+        }
+    }
+}
+
+fn add_batches(lineup: &mut Lineup, name: &str, class: Class, scene: &Rc<Scene>) {
+    for (form, width, coherent) in [
+        ("x8", 8, None),
+        ("x16", 16, None),
+        ("stream", 1, Some(false)),
+        ("stream coherent", 1, Some(true)),
+    ] {
+        let batch = Batched { scene: scene.clone(), width, coherent };
+        lineup.add(format!("{name} {form}"), class, batch);
+    }
+}
+
+/// Only the commit is timed: meshes are copied before.
+fn timed_scene(model: &Model, config: &CStr, setup: &Setup) -> (Option<Scene>, f64) {
+    let mut commits = Vec::new();
+    let (scene, _) = timed_build(|| {
+        let scene = Scene::new(model, config, setup)?;
+        let mut watch = Watch::new();
+        let failed = watch.time(|| scene.commit());
+        commits.push(watch.take().seconds);
+        (!failed).then_some(scene)
+    });
+    (scene, crate::watch::median(&mut commits))
+}
+
+/// A device and a scene on it.
+struct Scene(*mut RawScene);
+
+impl Scene {
+    fn new(model: &Model, config: &CStr, setup: &Setup) -> Option<Self> {
+        // SAFETY: the string ends with a zero.
+        let raw = unsafe { bench_embree_new(config.as_ptr(), setup.quality, setup.robust.into()) };
+        let scene = (!raw.is_null()).then_some(Scene(raw))?;
+        for mesh in &model.meshes {
+            let vertices = mesh.vertices.as_flattened();
+            let indices = mesh.indices.as_flattened();
+            // SAFETY: the counts are those of the slices, and every index names a vertex.
+            let failed = unsafe {
+                bench_embree_mesh(
+                    scene.0,
+                    vertices.as_ptr(),
+                    vertices.len() / 3,
+                    indices.as_ptr(),
+                    indices.len() / 3,
+                )
+            };
+            if failed != 0 {
+                return None;
+            }
+        }
+        Some(scene)
+    }
+
+    /// Whether it failed.
+    fn commit(&self) -> bool {
+        // SAFETY: the scene exists until it is dropped.
+        unsafe { bench_embree_commit(self.0) != 0 }
+    }
+
+    fn bytes(&self) -> usize {
+        // SAFETY: as above.
+        unsafe { bench_embree_bytes(self.0) }
+    }
+}
+
+impl Drop for Scene {
+    fn drop(&mut self) {
+        // SAFETY: nobody else frees it.
+        unsafe { bench_embree_free(self.0) }
+    }
+}
+
+/// One call a ray.
+struct Single(Rc<Scene>);
+
+impl Tracer for Single {
+    fn closest(&self, rays: &[Ray], hits: &mut [Hit], _coherent: bool, watch: &mut Watch) {
+        assert_eq!(rays.len(), hits.len());
+        let (scene, rays, count, hits) = (self.0.0, rays.as_ptr(), rays.len(), hits.as_mut_ptr());
+        // SAFETY: both slices have `count` elements.
+        watch.time(|| unsafe { bench_embree_closest(scene, rays, hits, count) });
+    }
+
+    fn any(&self, rays: &[Ray], occluded: &mut [bool], _coherent: bool, watch: &mut Watch) {
+        assert_eq!(rays.len(), occluded.len());
+        let (scene, count, occluded) = (self.0.0, rays.len(), occluded.as_mut_ptr().cast());
+        // SAFETY: both slices have `count` elements, and only 0 and 1 are written.
+        watch.time(|| unsafe { bench_embree_any(scene, rays.as_ptr(), occluded, count) });
+    }
+}
+
+/// Packets or a stream, in Embree's own layout.
+struct Batched {
+    scene: Rc<Scene>,
+    width: c_int,
+    /// What Embree is told, unless it follows from the rays.
+    coherent: Option<bool>,
+}
+
+impl Batched {
+    fn run(&self, rays: &[Ray], any: bool, coherent: bool, watch: &mut Watch) -> RawBatchOwner {
+        // SAFETY: the slice has that many rays.
+        let raw = unsafe { bench_batch_new(rays.as_ptr(), rays.len(), self.width, any.into()) };
+        assert!(!raw.is_null(), "memory for rays");
+        let coherent = self.coherent.unwrap_or(coherent).into();
+        // SAFETY: both exist, and the batch has not been run before.
+        watch.time(|| unsafe { bench_batch_run(self.scene.0, raw, coherent) });
+        RawBatchOwner(raw)
+    }
+}
+
+impl Tracer for Batched {
+    fn closest(&self, rays: &[Ray], hits: &mut [Hit], coherent: bool, watch: &mut Watch) {
+        assert_eq!(rays.len(), hits.len());
+        let batch = self.run(rays, false, coherent, watch);
+        // SAFETY: there are as many hits as rays in the batch.
+        unsafe { bench_batch_hits(batch.0, hits.as_mut_ptr()) };
+    }
+
+    fn any(&self, rays: &[Ray], occluded: &mut [bool], coherent: bool, watch: &mut Watch) {
+        assert_eq!(rays.len(), occluded.len());
+        let batch = self.run(rays, true, coherent, watch);
+        // SAFETY: as above, and only 0 and 1 are written.
+        unsafe { bench_batch_occluded(batch.0, occluded.as_mut_ptr().cast()) };
+    }
+}
+
+struct RawBatchOwner(*mut RawBatch);
+
+impl Drop for RawBatchOwner {
+    fn drop(&mut self) {
+        // SAFETY: nobody else frees it.
+        unsafe { bench_batch_free(self.0) }
+    }
+}

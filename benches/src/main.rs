@@ -1,0 +1,57 @@
+//! Measures raykern against its peers: the same rays, in turns, on one thread of one core.
+//!
+//! `cargo run --release -p raykern-bench --features embree,peers -- --help`; what the numbers mean
+//! is in docs/SPEED.md.
+
+mod c_face;
+mod check;
+#[cfg(feature = "embree")]
+mod embree;
+mod lineup;
+mod measure;
+mod options;
+mod ours;
+#[cfg(feature = "peers")]
+mod peers;
+mod ratios;
+mod rays;
+mod report;
+mod scenes;
+mod watch;
+
+use anyhow::{Context, Result};
+use clap::Parser;
+
+use crate::options::Options;
+use crate::watch::Watch;
+
+fn main() -> Result<()> {
+    let options = Options::parse();
+    report::machine(watch::stay_on(options.core), &options);
+    let mut watch = Watch::new();
+    if !watch.counts_events() {
+        println!("no processor events: this machine does not count them\n");
+    }
+    let mut results = Vec::new();
+    for case in scenes::cases(&options) {
+        let scene = match case.load(&options) {
+            Ok(scene) => scene,
+            Err(reason) => {
+                println!("{}: skipped: {reason}\n", case.name);
+                continue;
+            }
+        };
+        let result = measure::measure(&case, &scene, &options, &mut watch)
+            .with_context(|| case.name.clone())?;
+        report::scene(&result);
+        results.push(result);
+    }
+    if options.growth {
+        report::growth(&results);
+    }
+    ratios::print(&results);
+    if let Some(file) = &options.csv {
+        report::csv(&results, file).with_context(|| file.display().to_string())?;
+    }
+    Ok(())
+}
