@@ -3,7 +3,8 @@
 use super::collapse::{Shapes, choose};
 use super::compact;
 use super::emit::{BEGINS, Chosen, Sizes};
-use super::tree::{Areas, Limits, PrimRef, gather, grow, leaf_budget};
+use super::split::Areas;
+use super::tree::{Limits, PrimRef, gather, grow, leaf_budget};
 use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
@@ -55,18 +56,20 @@ fn front(survey: &Survey) -> Option<usize> {
 }
 
 /// The bytes for a good tree of bundles, and the bytes below which there is no tree at all.
+///
+/// The first is the larger of two: what growing takes, which is all that a scan or a terrain needs,
+/// and the finished block of a soup, in which leaf blocks hold 3.25 triangles.
 pub(crate) fn needs_wide(
     survey: &Survey,
     census: &Census,
     width: u32,
 ) -> Result<(usize, usize), BuildError> {
     let (compact, minimum) = compact::needs(survey, census)?;
-    let blocks = census.triangle_count.div_ceil(4) + census.sphere_count.div_ceil(8);
-    let sizes = Sizes {
-        bundles: 1 + 2 * blocks / width,
-        triangle_blocks: census.triangle_count.div_ceil(4),
-        sphere_blocks: census.sphere_count.div_ceil(8),
-    };
+    let triangle_blocks = (u64::from(census.triangle_count) * 4).div_ceil(13) as u32;
+    let sphere_blocks = census.sphere_count.div_ceil(4);
+    // A bundle has about three children in four lanes, and one of them is in place of itself.
+    let bundles = 2 + (7 * u64::from(triangle_blocks + sphere_blocks) / (4 * u64::from(width)));
+    let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks };
     let finished = counts(survey, census, &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
     Ok((compact.max(finished.end), minimum))
 }
@@ -159,7 +162,7 @@ fn grow_tree(
     // From the last on, each id goes to the end of the refs' place, onto refs that are done.
     let words = storage::view_mut::<u32>(front, places.refs, 8 * prims)?;
     for i in (0..prims).rev() {
-        words[7 * prims + i] = words[8 * i + 3];
+        words[7 * prims + i] = words[8 * i + PrimRef::ID];
     }
     Some(count)
 }
