@@ -277,4 +277,45 @@ mod tests {
         assert_eq!((levels_to_halve(5, 5), levels_to_halve(6, 5)), (1, 2));
         assert_eq!((levels_to_halve(6, 6), levels_to_halve(7, 6)), (1, 2));
     }
+
+    /// Levels of a tree, the root's included.
+    fn levels(nodes: &[BvhNode]) -> usize {
+        let mut depth = std::vec![1; nodes.len()];
+        for (i, node) in nodes.iter().enumerate().filter(|(i, node)| *i != 1 && !node.is_leaf()) {
+            depth[node.first as usize] = depth[i] + 1;
+            depth[node.first as usize + 1] = depth[i] + 1;
+        }
+        depth.into_iter().max().unwrap_or(0)
+    }
+
+    /// Boxes each `ratio` times as large and as far away as the one before: SAH parts the largest from
+    /// the others, again and again.
+    fn series(count: usize, ratio: f64) -> std::vec::Vec<PrimRef> {
+        let start = ratio.powi(-(count as i32) / 2);
+        let boxes = (0..count).map(|i| {
+            let size = (start * ratio.powi(i as i32)) as f32;
+            let aabb = Aabb { lower: [size, 0.0, 0.0], upper: [1.25 * size, size / 8.0, 0.0] };
+            PrimRef::new(i as u32, &aabb, false)
+        });
+        boxes.collect()
+    }
+
+    #[test]
+    fn no_scene_is_deeper_than_the_stack() {
+        let mut deepest = 0;
+        for ratio in [1.1f64, 1.3, 1.5, 2.0, 3.0, 4.0, 8.0] {
+            for (leaf_max, deep) in [(5, true), (6, false)] {
+                let count = (240.0 / ratio.log2()) as usize;
+                let leaves = leaf_budget(count, false, true);
+                let mut refs = series(count, ratio);
+                let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
+                let limits = Limits { leaves, leaf_max, mixed: false, deep };
+                let used = grow(&mut nodes, &mut refs, &limits).expect("room");
+                let levels = levels(&nodes[..used]);
+                assert!(levels <= MAX_DEPTH, "{ratio} {leaf_max}: {levels}");
+                deepest = deepest.max(levels);
+            }
+        }
+        assert!(deepest > 55, "the series is no test: {deepest}");
+    }
 }

@@ -58,14 +58,19 @@ fn front(survey: &Survey) -> Option<usize> {
 /// The bytes for a good tree of bundles, and the bytes below which there is no tree at all.
 ///
 /// The first is the larger of two: what growing takes, which is all that a scan or a terrain needs,
-/// and the finished block of a soup, in which leaf blocks hold 3.25 triangles.
+/// and the finished block of a soup, in which leaf blocks hold 3.25 to 3.45 triangles.
 pub(crate) fn needs_wide(
     survey: &Survey,
     census: &Census,
     width: u32,
 ) -> Result<(usize, usize), BuildError> {
     let (compact, minimum) = compact::needs(survey, census)?;
-    let triangle_blocks = (u64::from(census.triangle_count) * 4).div_ceil(13) as u32;
+    let fill = match width {
+        4 => 69,
+        8 => 67,
+        _ => 65,
+    };
+    let triangle_blocks = (u64::from(census.triangle_count) * 20).div_ceil(fill) as u32;
     let sphere_blocks = census.sphere_count.div_ceil(4);
     // A bundle has about three children in four lanes, and one of them is in place of itself.
     let bundles = 2 + (7 * u64::from(triangle_blocks + sphere_blocks) / (4 * u64::from(width)));
