@@ -132,20 +132,21 @@ impl Chosen<'_> {
             let (at, slots) = stack[pending];
             let node_at = self.nodes.get(at as usize)?;
             let choice = if node_at.is_leaf() { None } else { choice_of(self.choices, node_at) };
-            // A bundle's own node is split, unless it is the root and all is one leaf.
-            let is_leaf = choice.is_none_or(|c| c.is_leaf());
-            match choice {
-                Some(choice)
-                    if slots > 1
-                        && (at == node && !(at == 0 && is_leaf)
-                            || at != node && !choice.takes_one(slots)) =>
-                {
+            let is_leaf = choice.is_none_or(|choice| choice.is_leaf());
+            let splits = match choice {
+                // A bundle's own node is split, unless it is the root and all is one leaf.
+                Some(_) if at == node => at != 0 || !is_leaf,
+                Some(choice) => slots > 1 && !choice.takes_one(slots),
+                None => false,
+            };
+            match choice.filter(|_| splits) {
+                Some(choice) => {
                     let left = choice.left_of(slots);
                     *stack.get_mut(pending)? = (node_at.first + 1, slots.checked_sub(left)?);
                     *stack.get_mut(pending + 1)? = (node_at.first, left);
                     pending += 2;
                 }
-                _ => {
+                None => {
                     *lanes.get_mut(count)? = Lane { node: at, is_leaf };
                     count += 1;
                 }
@@ -187,7 +188,7 @@ mod tests {
     use std::vec::Vec;
 
     const LEAVES: usize = 7;
-    const PRICE: f32 = 0.001;
+    const PRICE: f32 = 0.05;
 
     /// Cubes strewn by a generator of 16 bits, each a leaf that stands for `spheres` spheres.
     fn tree(seed: u32, spheres: u32) -> Vec<BvhNode> {

@@ -109,7 +109,7 @@ fn centre(r: &PrimRef, k: usize) -> f32 {
 /// Bins along each axis at most.
 const BINS: usize = 16;
 /// Of more refs than twice this, some are enough to choose a plane by.
-const SAMPLES: usize = 1024;
+const SAMPLES: usize = 512;
 
 /// How centres fall into bins.
 #[derive(Clone, Copy)]
@@ -122,7 +122,7 @@ struct Binning {
 impl Binning {
     fn new(centres: &Box4, count: usize) -> Self {
         // Few refs leave most bins empty.
-        let bins = (4 + count / 4).min(BINS);
+        let bins = (4 + count / 8).min(BINS);
         let scale = core::array::from_fn(|k| bins as f32 / (centres.upper[k] - centres.lower[k]));
         Binning { lower: centres.lower, scale, bins }
     }

@@ -207,7 +207,10 @@ mod tests {
         assert!(!are_sound(&back, 0, 0), "a way back to the root");
         assert!(!are_sound(&[bundle(&[inner_of(1), inner_of(1)]), leaf], 1, 0), "two parents");
         assert!(!are_sound(&[bundle(&[inner_of(1)])], 0, 0), "a child that is not there");
-        assert!(!are_sound(&[leaf, bundle(&[triangles(1)])], 2, 0), "a bundle without a parent");
+        assert!(!are_sound(&[leaf, leaf], 1, 0), "a bundle without a parent");
+        assert!(!are_sound(&[bundle(&[inner_of(7)]), leaf], 1, 0), "a child far away");
+        let crossed = bundle(&[inner_of(2), inner_of(1)]);
+        assert!(!are_sound(&[crossed, a, b, leaf], 2, 0), "children in another order");
         assert!(!are_sound(&[bundle(&[inner_of(2)]), leaf, leaf], 1, 0), "a gap");
         let later = [top, b, a, bundle(&[triangles(0)])];
         assert!(!are_sound(&later, 2, 0), "children of the second before those of the first");
