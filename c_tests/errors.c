@@ -143,7 +143,7 @@ static void check_open_and_queries(void) {
     CHECK(rt_accel_open(swapped, size, &out) == RT_ERROR_BYTE_ORDER);
     seen[RT_ERROR_BYTE_ORDER] = true;
     open_with(RT_ERROR_BLOCK_VERSION, accel, 12, 99);
-    open_with(RT_ERROR_LAYOUT, accel, 28, 16);
+    open_with(RT_ERROR_LAYOUT, accel, 28, 5);
     open_with(RT_ERROR_CORRUPT, accel, 24, 77);
     CHECK(rt_accel_open(accel, size - 1, &out) == RT_ERROR_TRUNCATED);
     seen[RT_ERROR_TRUNCATED] = true;

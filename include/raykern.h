@@ -44,15 +44,16 @@
 // For a structure that is built once. Unsupported so far.
 #define RT_QUALITY_BEST 2
 
-// `RtBuildOptions.layout`: what suits this machine.
+// `RtBuildOptions.layout`: bundles of 16. The block says how it is read, not the machine: every
+// machine reads every layout.
 #define RT_LAYOUT_AUTOMATIC 0
-// Binary nodes of 32 bytes: the least memory.
+// Binary nodes of 32 bytes: the least memory and the least stack, for small machines.
 #define RT_LAYOUT_COMPACT 1
-// Bundles of 4 boxes. Unsupported so far.
+// Bundles of 4 boxes over whole leaf blocks. With little memory the layout may become compact after all.
 #define RT_LAYOUT_WIDE_4 4
-// Bundles of 8 boxes. Unsupported so far.
+// Bundles of 8 boxes over whole leaf blocks.
 #define RT_LAYOUT_WIDE_8 8
-// Bundles of 16 boxes. Unsupported so far.
+// Bundles of 16 boxes over whole leaf blocks.
 #define RT_LAYOUT_WIDE_16 16
 
 // `RtBuildOptions.plain_list`: for a handful of primitives, which no structure makes faster.
@@ -345,6 +346,9 @@ RtStatus rt_grid_needs(const RtScene *scene,
 
 // Builds a bounding volume hierarchy over `scene` in `memory`, which has `size` bytes and starts at
 // a multiple of 64. `options` may be null.
+//
+// With less than the `size` of `rt_bvh_needs` leaf blocks are fewer and fuller, and in the last
+// resort the layout is compact; `rt_accel_info` says which it is.
 //
 // The finished block lies at the front of `memory`, and `*out` is its first byte; what lies behind
 // `rt_accel_size` bytes may be used again. The scene is copied and no longer needed.

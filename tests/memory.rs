@@ -120,6 +120,89 @@ fn what_is_needed_is_enough_and_less_than_the_minimum_is_refused() {
 }
 
 #[test]
+fn with_less_memory_wide_leaves_fill_up_and_then_the_layout_is_compact() {
+    let (mut fuller, mut compact) = (0, 0);
+    for (name, model) in models() {
+        let rays = RayMaker::new(&model, 1).many(Family::Random, 50);
+        for structure in STRUCTURES {
+            let Layout::Wide(_) = structure.layout else { continue };
+            let full = structure.block(&model);
+            model.with_scene(|scene| {
+                let Memory { size, minimum, .. } = structure.needs(scene);
+                with_copy(&full, |full| {
+                    let full = Accel::open(full).expect("sound");
+                    for step in 0..=20 {
+                        // Odd sizes too: the memory need not end on a line.
+                        let between = minimum + (size - minimum) * step / 20;
+                        with_memory(between, 0, |m| {
+                            let built = structure.build(scene, m).expect("enough");
+                            match built.info().layout {
+                                Layout::Compact => compact += 1,
+                                _ => fuller += usize::from(built.block() != full.block()),
+                            }
+                            assert!(with_copy(built.block(), |m| Accel::open(m).is_ok()), "{name}");
+                            for ray in &rays {
+                                let (a, b) = (built.intersect(ray), full.intersect(ray));
+                                assert_eq!(bits(a), bits(b), "{name} {} {between}", structure.name);
+                            }
+                        });
+                    }
+                });
+            });
+        }
+    }
+    assert!(fuller > 4 && compact > 20, "{fuller} fuller, {compact} compact");
+}
+
+#[test]
+fn wide_layouts_take_what_is_promised() {
+    const COUNT: usize = 20_000;
+    for (name, make) in make::ALL {
+        let model = make(COUNT);
+        for structure in STRUCTURES {
+            let Layout::Wide(_) = structure.layout else { continue };
+            model.with_scene(|scene| {
+                let Memory { size, .. } = structure.needs(scene);
+                let prims = model.triangle_count() + model.sphere_count();
+                with_memory(size, 0, |m| {
+                    let info = structure.build(scene, m).expect("enough").info();
+                    let kind = structure.name;
+                    assert_eq!(info.layout, structure.layout, "{name}");
+                    assert!(size <= 100 * prims, "{name} {kind}: {} bytes", size / prims);
+                    assert!(size <= 3 * info.size, "{name} {kind}: {size} for {}", info.size);
+                });
+            });
+        }
+    }
+}
+
+#[test]
+fn layouts_are_four_and_a_block_knows_its_own() {
+    let model: Model = make::sphere(500).into();
+    model.with_scene(|scene| {
+        for width in [0, 1, 2, 3, 5, 7, 9, 15, 17, 32, u32::MAX] {
+            let options = BuildOptions { layout: Layout::Wide(width), ..BuildOptions::default() };
+            let refused = Some(BuildError::NoSuchLayout { width });
+            assert_eq!(raykern::bvh_needs(scene, &options).err(), refused);
+            assert_eq!(raykern::grid_needs(scene, &options).err(), refused);
+        }
+        let layout_of = |options: &BuildOptions| {
+            let size = raykern::bvh_needs(scene, options).expect("a size").size;
+            with_memory(size, 0, |m| {
+                raykern::build_bvh(scene, options, m).expect("enough").info().layout
+            })
+        };
+        let default = BuildOptions::default();
+        assert_eq!(layout_of(&default), Layout::Wide(16));
+        for layout in [Layout::Compact, Layout::Wide(4), Layout::Wide(8), Layout::Wide(16)] {
+            assert_eq!(layout_of(&BuildOptions { layout, ..default }), layout);
+        }
+        let list = BuildOptions { plain_list: PlainList::Always, ..default };
+        assert_eq!(layout_of(&list), Layout::Compact);
+    });
+}
+
+#[test]
 fn equal_builds_give_equal_bytes_and_a_copy_gives_equal_answers() {
     for (name, model) in models() {
         for structure in STRUCTURES {
@@ -140,10 +223,10 @@ fn equal_builds_give_equal_bytes_and_a_copy_gives_equal_answers() {
 #[test]
 fn broken_blocks_are_refused_or_harmless() {
     let mut random = Random::new(9);
-    let (mut refused, mut opened) = (0, 0);
-    for (name, model) in models() {
-        let rays = RayMaker::new(&model, 1).many(Family::Random, 20);
-        for structure in STRUCTURES {
+    for structure in STRUCTURES {
+        let (mut refused, mut opened) = (0, 0);
+        for (name, model) in models() {
+            let rays = RayMaker::new(&model, 1).many(Family::Random, 20);
             let good = structure.block(&model);
             for cut in [0, 1, 63, 64, good.len() / 2, good.len() - 1] {
                 with_copy(&good[..cut.min(good.len() - 1)], |m| {
@@ -179,6 +262,7 @@ fn broken_blocks_are_refused_or_harmless() {
                 });
             }
         }
+        let name = structure.name;
+        assert!(refused > 500 && opened > 500, "{name}: {refused} refused, {opened} opened");
     }
-    assert!(refused > 500 && opened > 500, "{refused} refused, {opened} opened");
 }

@@ -3,7 +3,7 @@
 #![allow(unsafe_code, reason = "a promise about the layout drawn here")]
 
 use super::leaf::{KIND_SPHERES, KIND_TRIANGLES};
-use crate::storage::Plain;
+use crate::storage::{self, Plain};
 
 /// `W` sibling records of a box and a reference, transposed: 4, 8 or 16.
 ///
@@ -97,6 +97,43 @@ impl ChildRef {
     pub fn leaf_block(self) -> (u32, usize) {
         let kind = if self.0 & Self::SPHERES != 0 { KIND_SPHERES } else { KIND_TRIANGLES };
         (kind, (self.0 & (Self::SPHERES - 1)) as usize)
+    }
+}
+
+/// The bundles of a block, if its layout has them.
+#[derive(Clone, Copy)]
+pub(crate) enum Bundles<'m> {
+    None,
+    Four(&'m [Bundle<4>]),
+    Eight(&'m [Bundle<8>]),
+    Sixteen(&'m [Bundle<16>]),
+}
+
+impl Bundles<'_> {
+    /// Their size in bytes.
+    pub fn size(&self) -> usize {
+        match self {
+            Bundles::None => 0,
+            Bundles::Four(bundles) => size_of_val(*bundles),
+            Bundles::Eight(bundles) => size_of_val(*bundles),
+            Bundles::Sixteen(bundles) => size_of_val(*bundles),
+        }
+    }
+}
+
+impl<'m> Bundles<'m> {
+    /// `lanes` lanes of bundles of this layout at `offset`; they fill their last bundle.
+    pub fn view(bytes: &'m [u8], offset: usize, layout: u32, lanes: u32) -> Option<Self> {
+        if lanes.checked_rem(layout)? != 0 {
+            return None;
+        }
+        let count = (lanes / layout) as usize;
+        Some(match layout {
+            4 => Bundles::Four(storage::view(bytes, offset, count)?),
+            8 => Bundles::Eight(storage::view(bytes, offset, count)?),
+            16 => Bundles::Sixteen(storage::view(bytes, offset, count)?),
+            _ => (lanes == 0).then_some(Bundles::None)?,
+        })
     }
 }
 

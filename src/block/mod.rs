@@ -15,10 +15,11 @@ pub(crate) mod cells;
 pub(crate) mod leaf;
 mod node;
 
+pub(crate) use bundle::Bundles;
 pub(crate) use leaf::Geometry;
 pub(crate) use node::BvhNode;
 
-use bundle::{Bundle, LANE};
+use bundle::LANE;
 use cells::{GridHead, Run};
 use leaf::{SphereBlock, TriangleBlock};
 
@@ -266,43 +267,6 @@ pub(crate) struct Block<'m> {
     pub sphere_blocks: &'m [SphereBlock],
     pub triangle_blocks: &'m [TriangleBlock],
     pub runs: &'m [Run],
-}
-
-/// The bundles of a block, if its layout has them.
-#[derive(Clone, Copy)]
-pub(crate) enum Bundles<'m> {
-    None,
-    Four(&'m [Bundle<4>]),
-    Eight(&'m [Bundle<8>]),
-    Sixteen(&'m [Bundle<16>]),
-}
-
-impl Bundles<'_> {
-    /// Their size in bytes.
-    pub fn size(&self) -> usize {
-        match self {
-            Bundles::None => 0,
-            Bundles::Four(bundles) => size_of_val(*bundles),
-            Bundles::Eight(bundles) => size_of_val(*bundles),
-            Bundles::Sixteen(bundles) => size_of_val(*bundles),
-        }
-    }
-}
-
-impl<'m> Bundles<'m> {
-    /// `lanes` lanes of bundles of this layout at `offset`; they fill their last bundle.
-    fn view(bytes: &'m [u8], offset: usize, layout: u32, lanes: u32) -> Option<Self> {
-        if lanes.checked_rem(layout)? != 0 {
-            return None;
-        }
-        let count = (lanes / layout) as usize;
-        Some(match layout {
-            4 => Bundles::Four(storage::view(bytes, offset, count)?),
-            8 => Bundles::Eight(storage::view(bytes, offset, count)?),
-            16 => Bundles::Sixteen(storage::view(bytes, offset, count)?),
-            _ => (lanes == 0).then_some(Bundles::None)?,
-        })
-    }
 }
 
 impl<'m> Block<'m> {

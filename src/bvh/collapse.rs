@@ -2,7 +2,8 @@
 
 use super::MAX_DEPTH;
 use super::fits::Corners;
-use super::tree::{Areas, Grown};
+use super::split::Areas;
+use super::tree::Grown;
 use crate::block::leaf::{SPHERES, TRIANGLES};
 use crate::block::{BvhNode, Geometry};
 use crate::math::Aabb;
@@ -62,6 +63,8 @@ pub(crate) struct Shapes<'s, 'a> {
 struct Decided<const W: usize> {
     /// The least cost with 1 .. W lanes.
     cost: [f32; W],
+    /// More lanes than this, or than W, change nothing: the leaves of the binary tree.
+    lanes: usize,
     aabb: Aabb,
     content: Content,
 }
@@ -99,21 +102,28 @@ pub(crate) fn choose<const W: usize>(
     price: f32,
     choices: &mut [u64],
 ) -> Option<()> {
-    const EMPTY: Content = Content::Much;
-    let nothing = Decided { cost: [0.0; W], aabb: Aabb::EMPTY, content: EMPTY };
-    let mut stack = [nothing; MAX_DEPTH + 1];
+    let nothing = Decided::<W>::NOTHING;
+    let mut stack = [nothing; MAX_DEPTH + 2];
     let mut pending = 0;
     for (pair, choice) in nodes.chunks_exact(2).skip(1).zip(choices).rev() {
-        let [mut left, mut right] = [nothing; 2];
-        for (node, decided) in pair.iter().zip([&mut left, &mut right]) {
-            *decided = if node.is_leaf() {
-                leaf(node, shapes, areas, price)?
-            } else {
-                pending = usize::checked_sub(pending, 1)?;
-                *stack.get(pending)?
-            };
-        }
-        let (decided, chosen) = join(&left, &right, areas, price);
+        let [left, right] = pair else { return None };
+        let (mut left_leaf, mut right_leaf) = (nothing, nothing);
+        // What was decided last is left.
+        let left = if left.is_leaf() {
+            left_leaf.set_leaf(left, shapes, areas, price)?;
+            &left_leaf
+        } else {
+            pending = usize::checked_sub(pending, 1)?;
+            stack.get(pending)?
+        };
+        let right = if right.is_leaf() {
+            right_leaf.set_leaf(right, shapes, areas, price)?;
+            &right_leaf
+        } else {
+            pending = usize::checked_sub(pending, 1)?;
+            stack.get(pending)?
+        };
+        let (decided, chosen) = join(left, right, areas, price);
         *choice = chosen.0;
         *stack.get_mut(pending)? = decided;
         pending += 1;
@@ -121,28 +131,37 @@ pub(crate) fn choose<const W: usize>(
     Some(())
 }
 
-/// A leaf of the binary tree.
-fn leaf<const W: usize>(
-    node: &BvhNode,
-    shapes: &Shapes,
-    areas: Areas,
-    price: f32,
-) -> Option<Decided<W>> {
-    let (count, is_sphere) = Grown::of(node);
-    let aabb = node.aabb();
-    let cost = [areas.of(&aabb) + price; W];
-    if is_sphere {
-        return Some(Decided { cost, aabb, content: Content::Spheres { count } });
-    }
-    let mut corners = Corners::NONE;
-    let first = node.first as usize;
-    for id in shapes.ids.get(first..first + count)? {
-        if let Shape::Triangle(triangle) = shape(shapes.scene, shapes.geometries, *id)? {
-            // Five triangles always fit.
-            triangle.into_iter().for_each(|vertex| _ = corners.add(vertex));
+impl<const W: usize> Decided<W> {
+    const NOTHING: Self =
+        Decided { cost: [0.0; W], lanes: 0, aabb: Aabb::EMPTY, content: Content::Much };
+
+    /// Becomes a leaf of the binary tree.
+    fn set_leaf(
+        &mut self,
+        node: &BvhNode,
+        shapes: &Shapes,
+        areas: Areas,
+        price: f32,
+    ) -> Option<()> {
+        let (count, is_sphere) = Grown::of(node);
+        self.aabb = node.aabb();
+        self.cost = [areas.of(&self.aabb) + price; W];
+        self.lanes = 1;
+        if is_sphere {
+            self.content = Content::Spheres { count };
+            return Some(());
         }
+        let mut corners = Corners::NONE;
+        let first = node.first as usize;
+        for id in shapes.ids.get(first..first + count)? {
+            if let Shape::Triangle(triangle) = shape(shapes.scene, shapes.geometries, *id)? {
+                // Five triangles always fit.
+                triangle.into_iter().for_each(|vertex| _ = corners.add(vertex));
+            }
+        }
+        self.content = Content::Triangles { count, corners };
+        Some(())
     }
-    Some(Decided { cost, aabb, content: Content::Triangles { count, corners } })
 }
 
 fn join<const W: usize>(
@@ -155,7 +174,7 @@ fn join<const W: usize>(
     aabb.add(&right.aabb);
     let area = areas.of(&aabb);
     let content = together(&left.content, &right.content);
-    let (shared, split) = share(&left.cost, &right.cost);
+    let (shared, split) = share(left, right);
     let block = match content {
         Content::Much => f32::INFINITY,
         _ => area + price,
@@ -167,7 +186,8 @@ fn join<const W: usize>(
     let least = (1..W).find(|&i| shared[i] < one).map_or(W + 1, |i| i + 1);
     let mut cost = shared;
     cost[..(least - 1).min(W)].fill(one);
-    (Decided { cost, aabb, content }, Choice::new(is_leaf, least, &split))
+    let lanes = left.lanes + right.lanes;
+    (Decided { cost, lanes, aabb, content }, Choice::new(is_leaf, least, &split))
 }
 
 /// Bytes of a bundle against those of a leaf block.
@@ -177,15 +197,18 @@ fn bundle_price(width: usize) -> f32 {
 
 /// The least cost of two subtrees that share 1 .. W lanes, and the lanes of the left one. One lane
 /// is not enough for two.
-fn share<const W: usize>(left: &[f32; W], right: &[f32; W]) -> ([f32; W], [u32; W]) {
+fn share<const W: usize>(left: &Decided<W>, right: &Decided<W>) -> ([f32; W], [u32; W]) {
     let (mut cost, mut split) = ([f32::INFINITY; W], [0; W]);
-    for k in 1..W {
-        for j in k + 1..=W {
-            let sum = left[k - 1] + right[j - k - 1];
-            if sum < cost[j - 1] {
-                cost[j - 1] = sum;
-                split[j - 1] = k as u32;
-            }
+    // The right one's costs behind as many lanes as are impossible, so that every shift of them is
+    // a whole row.
+    let mut shifted = [f32::INFINITY; 32];
+    shifted[W..2 * W].copy_from_slice(&right.cost);
+    for k in 1..=left.lanes.min(W - 1) {
+        let (row, one) = (&shifted[W - k..][..W], left.cost[k - 1]);
+        for ((cost, split), right) in cost.iter_mut().zip(&mut split).zip(row) {
+            let sum = one + right;
+            *split = if sum < *cost { k as u32 } else { *split };
+            *cost = if sum < *cost { sum } else { *cost };
         }
     }
     (cost, split)

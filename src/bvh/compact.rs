@@ -87,9 +87,11 @@ fn grow_tree(scene: &Scene, census: &Census, plan: &Plan, bytes: &mut [u8]) -> O
     let limits = Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false };
     let node_count = grow(nodes, refs, &limits)?;
     // Triangles first, then spheres, each in the order of the leaves.
-    let kinds = [0, 1].into_iter().flat_map(|kind| refs.iter().filter(move |r| r.sphere == kind));
+    let kinds = [false, true];
+    let kinds =
+        kinds.into_iter().flat_map(|kind| refs.iter().filter(move |r| r.is_sphere() == kind));
     for (id, r) in prim_ids.iter_mut().zip(kinds) {
-        *id = r.id;
+        *id = r.id();
     }
     Some(node_count)
 }

@@ -132,20 +132,21 @@ impl Chosen<'_> {
             let (at, slots) = stack[pending];
             let node_at = self.nodes.get(at as usize)?;
             let choice = if node_at.is_leaf() { None } else { choice_of(self.choices, node_at) };
-            // A bundle's own node is split, unless it is the root and all is one leaf.
-            let is_leaf = choice.is_none_or(|c| c.is_leaf());
-            match choice {
-                Some(choice)
-                    if slots > 1
-                        && (at == node && !(at == 0 && is_leaf)
-                            || at != node && !choice.takes_one(slots)) =>
-                {
+            let is_leaf = choice.is_none_or(|choice| choice.is_leaf());
+            let splits = match choice {
+                // A bundle's own node is split, unless it is the root and all is one leaf.
+                Some(_) if at == node => at != 0 || !is_leaf,
+                Some(choice) => slots > 1 && !choice.takes_one(slots),
+                None => false,
+            };
+            match choice.filter(|_| splits) {
+                Some(choice) => {
                     let left = choice.left_of(slots);
                     *stack.get_mut(pending)? = (node_at.first + 1, slots.checked_sub(left)?);
                     *stack.get_mut(pending + 1)? = (node_at.first, left);
                     pending += 2;
                 }
-                _ => {
+                None => {
                     *lanes.get_mut(count)? = Lane { node: at, is_leaf };
                     count += 1;
                 }
@@ -174,4 +175,132 @@ struct Content {
     first: usize,
     end: usize,
     is_sphere: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::collapse::{Shapes, choose};
+    use crate::bvh::split::Areas;
+    use crate::bvh::tree::{Limits, PrimRef, grow};
+    use crate::math::Aabb;
+    use crate::scene::Scene;
+    use std::vec::Vec;
+
+    const LEAVES: usize = 7;
+    const PRICE: f32 = 0.05;
+
+    /// Cubes strewn by a generator of 16 bits, each a leaf that stands for `spheres` spheres.
+    fn tree(seed: u32, spheres: u32) -> Vec<BvhNode> {
+        let mut state = seed;
+        let mut next = || {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            (state >> 16) as f32 / 65536.0
+        };
+        let mut refs: Vec<_> = (0..LEAVES as u32)
+            .map(|id| {
+                let lower = [next(), next(), next()];
+                let edge = 0.3 * next();
+                PrimRef::new(id, &Aabb { lower, upper: lower.map(|x| x + edge) }, true)
+            })
+            .collect();
+        let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * LEAVES];
+        let limits = Limits { leaves: LEAVES, leaf_max: 1, mixed: false, deep: true };
+        assert_eq!(grow(&mut nodes, &mut refs, &limits), Some(2 * LEAVES));
+        for node in nodes.iter_mut().filter(|node| node.is_leaf()) {
+            node.lanes = spheres | 1 << 8;
+        }
+        nodes
+    }
+
+    fn areas() -> Areas {
+        Areas::new(&Aabb { lower: [0.0; 3], upper: [1.3; 3] })
+    }
+
+    /// What an inner node may become; all that are in reach of `W` lanes are tried below.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Fate {
+        Gone,
+        Bundle,
+        Leaf,
+    }
+
+    /// The nodes that stand for `node` in the bundle above it.
+    fn lanes(nodes: &[BvhNode], fates: &[Fate], node: usize) -> Vec<usize> {
+        let at = &nodes[node];
+        if at.is_leaf() || fates[at.first as usize / 2 - 1] != Fate::Gone {
+            return std::vec![node];
+        }
+        let first = at.first as usize;
+        [lanes(nodes, fates, first), lanes(nodes, fates, first + 1)].concat()
+    }
+
+    /// The cost of a node as one lane, and the spheres below it.
+    fn cost(nodes: &[BvhNode], fates: &[Fate], node: usize, width: usize) -> (f32, u32) {
+        let at = &nodes[node];
+        let area = areas().of(&at.aabb());
+        if at.is_leaf() {
+            return (area + PRICE, at.lanes & 0xff);
+        }
+        let first = at.first as usize;
+        let below = [lanes(nodes, fates, first), lanes(nodes, fates, first + 1)].concat();
+        let mut sum = (0.0, 0);
+        for lane in &below {
+            let (cost, spheres) = cost(nodes, fates, *lane, width);
+            sum = (sum.0 + cost, sum.1 + spheres);
+        }
+        let own = match fates[first / 2 - 1] {
+            Fate::Leaf if sum.1 <= 15 => area + PRICE,
+            Fate::Bundle if below.len() <= width => {
+                area + PRICE * (28 * width) as f32 / 256.0 + sum.0
+            }
+            _ => f32::INFINITY,
+        };
+        (own, sum.1)
+    }
+
+    /// The least cost of all trees there are.
+    fn least(nodes: &[BvhNode], width: usize) -> f32 {
+        let inner = LEAVES - 1;
+        let all = (0..3usize.pow(inner as u32)).map(|code| {
+            let fates: Vec<_> = (0..inner as u32)
+                .map(|i| [Fate::Gone, Fate::Bundle, Fate::Leaf][code / 3usize.pow(i) % 3])
+                .collect();
+            cost(nodes, &fates, 0, width).0
+        });
+        all.fold(f32::INFINITY, f32::min)
+    }
+
+    fn chosen<const W: usize>(nodes: &[BvhNode]) -> f32 {
+        let mut choices = [0; LEAVES - 1];
+        let shapes = Shapes { scene: &Scene::new(&[], &[]), geometries: &[], ids: &[] };
+        choose::<W>(nodes, &shapes, areas(), PRICE, &mut choices).expect("a tree");
+        let area = |node: u32| areas().of(&nodes[node as usize].aabb());
+        let mut sum = area(0) + PRICE * (28 * W) as f32 / 256.0;
+        Chosen { nodes, choices: &choices, ids: &[] }
+            .for_each_bundle::<W>(|_, lanes| {
+                assert!((1..=W).contains(&lanes.len()));
+                for lane in lanes {
+                    let bytes = if lane.is_leaf { 256 } else { 28 * W };
+                    sum += area(lane.node) + PRICE * bytes as f32 / 256.0;
+                }
+                Some(())
+            })
+            .expect("a walk");
+        sum
+    }
+
+    #[test]
+    fn no_other_tree_of_bundles_costs_less() {
+        for seed in 0..40 {
+            // Two, three or five leaves of the binary tree fill a block.
+            for spheres in [3, 5, 7] {
+                let nodes = tree(seed, spheres);
+                let (four, best) = (chosen::<4>(&nodes), least(&nodes, 4));
+                assert!((four - best).abs() <= 1e-5 * best, "{seed} {spheres}: {four} {best}");
+                let (eight, best) = (chosen::<8>(&nodes), least(&nodes, 8));
+                assert!((eight - best).abs() <= 1e-5 * best, "{seed} {spheres}: {eight} {best}");
+            }
+        }
+    }
 }

@@ -5,6 +5,7 @@ mod collapse;
 mod compact;
 mod emit;
 mod fits;
+mod split;
 mod stack;
 mod traverse;
 mod tree;

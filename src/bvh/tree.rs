@@ -2,9 +2,8 @@
 
 #![allow(unsafe_code, reason = "a promise about the layout drawn here")]
 
-use glam::DVec3;
-
 use super::MAX_DEPTH;
+use super::split::{Areas, Bins, Box4, Extent, best_plane};
 use crate::block::BvhNode;
 use crate::math::Aabb;
 use crate::prim::{Shape, for_each_prim};
@@ -17,27 +16,38 @@ use crate::storage::Plain;
 /// byte 0       12   16      28          32
 ///      | lower | id | upper | is sphere |
 /// ```
-#[derive(Clone, Copy, Debug)]
+///
+/// The numbers stand in the fourth lanes of the box. They are below `2^30`, so as floats they are
+/// numbers too.
+#[derive(Clone, Copy)]
 #[repr(C)]
 pub(crate) struct PrimRef {
-    pub lower: [f32; 3],
-    pub id: u32,
-    pub upper: [f32; 3],
-    /// 0 or 1.
-    pub sphere: u32,
+    pub bounds: Box4,
 }
 const _: () = assert!(size_of::<PrimRef>() == 32);
 
-// SAFETY: numbers only; 12 + 4 + 12 + 4 = 32, so no padding.
+// SAFETY: eight numbers of equal size, so no padding.
 unsafe impl Plain for PrimRef {}
 
 impl PrimRef {
+    /// Where the id is among the words of a ref.
+    pub const ID: usize = 3;
+
     pub fn new(id: u32, aabb: &Aabb, sphere: bool) -> Self {
-        PrimRef { lower: aabb.lower, id, upper: aabb.upper, sphere: u32::from(sphere) }
+        let lane = |[x, y, z]: [f32; 3], word: u32| {
+            // -0 becomes +0.
+            [x + 0.0, y + 0.0, z + 0.0, f32::from_bits(word)]
+        };
+        let (lower, upper) = (lane(aabb.lower, id), lane(aabb.upper, sphere.into()));
+        PrimRef { bounds: Box4 { lower, upper } }
     }
 
-    fn aabb(&self) -> Aabb {
-        Aabb { lower: self.lower, upper: self.upper }
+    pub fn id(&self) -> u32 {
+        self.bounds.lower[3].to_bits()
+    }
+
+    pub fn is_sphere(&self) -> bool {
+        self.bounds.upper[3].to_bits() != 0
     }
 }
 
@@ -58,36 +68,13 @@ pub(crate) struct Grown;
 
 impl Grown {
     fn leaf(bounds: &Aabb, first: usize, refs: &[PrimRef]) -> BvhNode {
-        let sphere = refs.first().map_or(0, |r| r.sphere);
+        let sphere = u32::from(refs.first().is_some_and(PrimRef::is_sphere));
         BvhNode { lanes: refs.len() as u32 | sphere << 8, ..BvhNode::inner(bounds, first as u32) }
     }
 
     /// The number of refs, and whether they are spheres.
     pub fn of(node: &BvhNode) -> (usize, bool) {
         ((node.lanes & 0xFF) as usize, node.lanes >> 8 != 0)
-    }
-}
-
-/// Areas of boxes as `f32`, in units in which a scene's coordinates are about 1 at most: they
-/// neither overflow nor, unless a box is 1e-19 of the scene, underflow.
-#[derive(Clone, Copy)]
-pub(crate) struct Areas(f32);
-
-impl Areas {
-    pub fn new(bounds: &Aabb) -> Self {
-        // 2 to the minus exponent, as far as that is a normal number.
-        let exponent = bounds.reach().to_bits() >> 23;
-        Areas(f32::from_bits(254u32.saturating_sub(exponent).max(1) << 23))
-    }
-
-    /// Half the surface area. Finite, and not NaN, for infinite boxes too.
-    pub fn of(self, aabb: &Aabb) -> f32 {
-        let edge = |k: usize| {
-            let edge = aabb.upper[k] * self.0 - aabb.lower[k] * self.0;
-            if edge < 16.0 { if edge > 0.0 { edge } else { 0.0 } } else { 16.0 }
-        };
-        let [x, y, z] = [edge(0), edge(1), edge(2)];
-        x * y + y * z + z * x
     }
 }
 
@@ -105,8 +92,7 @@ pub(crate) struct Limits {
 }
 
 /// Cost of a step to two children, in tests of one primitive.
-const STEP_COST: f64 = 2.0;
-const BINS: usize = 16;
+const STEP_COST: f32 = 2.0;
 
 /// A subtree to build: the refs `first .. first + count` under node `node`.
 #[derive(Clone, Copy)]
@@ -117,15 +103,14 @@ struct Task {
     depth: usize,
     /// Leaves it may have.
     budget: usize,
-    bounds: Aabb,
+    extent: Extent,
 }
 
 /// Where a node's refs are parted, the fewest leaves that either side needs, and their boxes.
 struct Split {
     left_count: usize,
     least: [usize; 2],
-    left: Aabb,
-    right: Aabb,
+    sides: [Extent; 2],
 }
 
 /// The fewest leaves that `count` primitives can always be brought into by halving, and by parting
@@ -165,9 +150,11 @@ fn levels_to_halve(count: usize, leaf_max: usize) -> usize {
 /// Source: \[Wald07\], with leaves limited in number as the memory is.
 pub(crate) fn grow(nodes: &mut [BvhNode], refs: &mut [PrimRef], limits: &Limits) -> Option<usize> {
     let budget = limits.leaves;
-    let bounds = bounds_of(refs);
+    let extent = Extent::around(refs);
+    let areas = Areas::new(&extent.bounds.aabb());
+    let mut bins = Bins::EMPTY;
     let mut stack =
-        [Task { node: 0, first: 0, count: refs.len(), depth: 0, budget, bounds }; MAX_DEPTH];
+        [Task { node: 0, first: 0, count: refs.len(), depth: 0, budget, extent }; MAX_DEPTH];
     let mut pending = 1;
     let mut used = 2;
     while pending > 0 {
@@ -175,11 +162,11 @@ pub(crate) fn grow(nodes: &mut [BvhNode], refs: &mut [PrimRef], limits: &Limits)
         let task = stack[pending];
         let range = refs.get_mut(task.first..task.first + task.count)?;
         let node = nodes.get_mut(task.node as usize)?;
-        let Some(split) = part(range, &task, limits) else {
-            *node = Grown::leaf(&task.bounds, task.first, range);
+        let Some(split) = part(range, &task, limits, areas, &mut bins) else {
+            *node = Grown::leaf(&task.extent.bounds.aabb(), task.first, range);
             continue;
         };
-        *node = BvhNode::inner(&task.bounds, used);
+        *node = BvhNode::inner(&task.extent.bounds.aabb(), used);
         let right_count = task.count - split.left_count;
         let left_budget = share(&task, &split);
         let children = [
@@ -189,7 +176,7 @@ pub(crate) fn grow(nodes: &mut [BvhNode], refs: &mut [PrimRef], limits: &Limits)
                 count: right_count,
                 depth: task.depth + 1,
                 budget: task.budget - left_budget,
-                bounds: split.right,
+                extent: split.sides[1],
             },
             Task {
                 node: used,
@@ -197,7 +184,7 @@ pub(crate) fn grow(nodes: &mut [BvhNode], refs: &mut [PrimRef], limits: &Limits)
                 count: split.left_count,
                 depth: task.depth + 1,
                 budget: left_budget,
-                bounds: split.left,
+                extent: split.sides[0],
             },
         ];
         used += 2;
@@ -219,10 +206,16 @@ fn share(task: &Task, split: &Split) -> usize {
 }
 
 /// Parts the refs of a node in two, or decides for a leaf.
-fn part(refs: &mut [PrimRef], task: &Task, limits: &Limits) -> Option<Split> {
+fn part(
+    refs: &mut [PrimRef],
+    task: &Task,
+    limits: &Limits,
+    areas: Areas,
+    bins: &mut Bins,
+) -> Option<Split> {
     let Limits { leaf_max, mixed, deep, .. } = *limits;
     let count = refs.len();
-    let spheres = if mixed { refs.iter().filter(|r| r.sphere != 0).count() } else { 0 };
+    let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
     let one_kind = !mixed || spheres == 0 || spheres == count;
     let may_be_leaf = count <= leaf_max && one_kind;
     if may_be_leaf && (count == 1 || task.budget < 2) {
@@ -231,159 +224,34 @@ fn part(refs: &mut [PrimRef], task: &Task, limits: &Limits) -> Option<Split> {
     let least = |left_count: usize| {
         [fewest_leaves(left_count, mixed), fewest_leaves(count - left_count, mixed)]
     };
-    let sah = binned(refs, task).filter(|plane| {
-        let [left, right] = least(plane.left_count);
-        let levels = levels_to_halve(plane.left_count.max(count - plane.left_count), leaf_max);
-        left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
+    let pays = |work: f32| {
+        let area = areas.of(&task.extent.bounds.aabb());
+        // Everything on one line or in one point: any split is as good as another.
+        STEP_COST * area + work < area * count as f32 || area == 0.0
+    };
+    let plane = best_plane(refs, &task.extent, areas, bins);
+    let sah = plane.filter(|plane| !may_be_leaf || deep || pays(plane.work)).and_then(|plane| {
+        let left_count = plane.part(refs);
+        let least = least(left_count);
+        let levels = levels_to_halve(left_count.max(count - left_count), leaf_max);
+        let lasts = least[0] + least[1] <= task.budget && task.depth + 1 + levels < MAX_DEPTH;
+        lasts.then(|| split_at(refs, left_count, least))
     });
     match sah {
-        Some(plane) if !may_be_leaf || deep || plane.cost < count as f64 => {
-            let left_count = partition(refs, |r| plane.is_left(r));
-            let least = least(left_count);
-            Some(Split { left_count, least, left: plane.left, right: plane.right })
-        }
-        _ if may_be_leaf => None,
+        Some(split) => Some(split),
+        None if may_be_leaf => None,
         // Few, but of two kinds: each kind can be one leaf.
-        _ if count <= leaf_max => {
-            let left_count = partition(refs, |r| r.sphere == 0);
-            Some(split_at(refs, left_count, [1, 1]))
+        None if count <= leaf_max => {
+            refs.sort_unstable_by_key(|r| (r.is_sphere(), r.id()));
+            Some(split_at(refs, count - spheres, [1, 1]))
         }
-        _ => Some(split_at(refs, count / 2, least(count / 2))),
+        None => Some(split_at(refs, count / 2, least(count / 2))),
     }
 }
 
 fn split_at(refs: &[PrimRef], left_count: usize, least: [usize; 2]) -> Split {
     let (left, right) = refs.split_at(left_count);
-    Split { left_count, least, left: bounds_of(left), right: bounds_of(right) }
-}
-
-fn bounds_of(refs: &[PrimRef]) -> Aabb {
-    let mut bounds = Aabb::EMPTY;
-    for r in refs {
-        bounds.add(&r.aabb());
-    }
-    bounds
-}
-
-/// Brings the refs for which `left` holds to the front; returns their number.
-fn partition(refs: &mut [PrimRef], left: impl Fn(&PrimRef) -> bool) -> usize {
-    let (mut i, mut end) = (0, refs.len());
-    while i < end {
-        if left(&refs[i]) {
-            i += 1;
-        } else {
-            end -= 1;
-            refs.swap(i, end);
-        }
-    }
-    i
-}
-
-/// The plane with the least cost, between two bins of one axis.
-struct Plane {
-    binning: Binning,
-    axis: usize,
-    /// Bins below this one are left.
-    bin: usize,
-    cost: f64,
-    left_count: usize,
-    left: Aabb,
-    right: Aabb,
-}
-
-impl Plane {
-    fn is_left(&self, r: &PrimRef) -> bool {
-        self.binning.bins_of(r)[self.axis] < self.bin
-    }
-}
-
-/// How centroids fall into bins.
-#[derive(Clone, Copy)]
-struct Binning {
-    lower: DVec3,
-    scale: DVec3,
-}
-
-impl Binning {
-    fn around(refs: &[PrimRef]) -> Self {
-        let mut lower = DVec3::splat(f64::INFINITY);
-        let mut upper = DVec3::splat(f64::NEG_INFINITY);
-        for r in refs {
-            let c = r.aabb().centroid2();
-            lower = lower.min(c);
-            upper = upper.max(c);
-        }
-        Binning { lower, scale: BINS as f64 / (upper - lower) }
-    }
-
-    /// The bin on each axis. A float-to-integer cast saturates and sends NaN, which comes from
-    /// infinite boxes or an axis without extent, to 0: everything is in some bin.
-    fn bins_of(&self, r: &PrimRef) -> [usize; 3] {
-        let at = (r.aabb().centroid2() - self.lower) * self.scale;
-        at.to_array().map(|x| (x as usize).min(BINS - 1))
-    }
-}
-
-#[derive(Clone, Copy)]
-struct Bin {
-    bounds: Aabb,
-    count: usize,
-}
-
-const EMPTY_BIN: Bin = Bin { bounds: Aabb::EMPTY, count: 0 };
-
-impl Bin {
-    fn add(&mut self, bounds: &Aabb, count: usize) {
-        self.bounds.add(bounds);
-        self.count += count;
-    }
-}
-
-/// The best split by bins, or `None` when all centroids fall into one.
-fn binned(refs: &[PrimRef], task: &Task) -> Option<Plane> {
-    let binning = Binning::around(refs);
-    let mut bins = [[EMPTY_BIN; BINS]; 3];
-    for r in refs {
-        let aabb = r.aabb();
-        for (axis, bin) in binning.bins_of(r).into_iter().enumerate() {
-            bins[axis][bin].add(&aabb, 1);
-        }
-    }
-    let mut best: Option<Plane> = None;
-    for (axis, bins) in bins.iter().enumerate() {
-        // What lies right of each plane, from the right; then what lies left, and the cost.
-        let mut right = [EMPTY_BIN; BINS];
-        let mut sum = EMPTY_BIN;
-        for bin in (1..BINS).rev() {
-            sum.add(&bins[bin].bounds, bins[bin].count);
-            right[bin] = sum;
-        }
-        let mut left = EMPTY_BIN;
-        for bin in 1..BINS {
-            left.add(&bins[bin - 1].bounds, bins[bin - 1].count);
-            let right = right[bin];
-            if left.count == 0 || right.count == 0 {
-                continue;
-            }
-            let work = left.bounds.half_area() * left.count as f64
-                + right.bounds.half_area() * right.count as f64;
-            let area = task.bounds.half_area();
-            // Everything on one line or in one point: any split is as good as another.
-            let cost = STEP_COST + if area > 0.0 { work / area } else { 0.0 };
-            if best.as_ref().is_none_or(|best| cost < best.cost) {
-                best = Some(Plane {
-                    binning,
-                    axis,
-                    bin,
-                    cost,
-                    left_count: left.count,
-                    left: left.bounds,
-                    right: right.bounds,
-                });
-            }
-        }
-    }
-    best
+    Split { left_count, least, sides: [Extent::around(left), Extent::around(right)] }
 }
 
 #[cfg(test)]
@@ -408,5 +276,46 @@ mod tests {
         assert!(levels_to_halve(1 << 30, 5) < MAX_DEPTH - 32);
         assert_eq!((levels_to_halve(5, 5), levels_to_halve(6, 5)), (1, 2));
         assert_eq!((levels_to_halve(6, 6), levels_to_halve(7, 6)), (1, 2));
+    }
+
+    /// Levels of a tree, the root's included.
+    fn levels(nodes: &[BvhNode]) -> usize {
+        let mut depth = std::vec![1; nodes.len()];
+        for (i, node) in nodes.iter().enumerate().filter(|(i, node)| *i != 1 && !node.is_leaf()) {
+            depth[node.first as usize] = depth[i] + 1;
+            depth[node.first as usize + 1] = depth[i] + 1;
+        }
+        depth.into_iter().max().unwrap_or(0)
+    }
+
+    /// Boxes each `ratio` times as large and as far away as the one before: SAH parts the largest from
+    /// the others, again and again.
+    fn series(count: usize, ratio: f64) -> std::vec::Vec<PrimRef> {
+        let start = ratio.powi(-(count as i32) / 2);
+        let boxes = (0..count).map(|i| {
+            let size = (start * ratio.powi(i as i32)) as f32;
+            let aabb = Aabb { lower: [size, 0.0, 0.0], upper: [1.25 * size, size / 8.0, 0.0] };
+            PrimRef::new(i as u32, &aabb, false)
+        });
+        boxes.collect()
+    }
+
+    #[test]
+    fn no_scene_is_deeper_than_the_stack() {
+        let mut deepest = 0;
+        for ratio in [1.1f64, 1.3, 1.5, 2.0, 3.0, 4.0, 8.0] {
+            for (leaf_max, deep) in [(5, true), (6, false)] {
+                let count = (240.0 / ratio.log2()) as usize;
+                let leaves = leaf_budget(count, false, true);
+                let mut refs = series(count, ratio);
+                let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
+                let limits = Limits { leaves, leaf_max, mixed: false, deep };
+                let used = grow(&mut nodes, &mut refs, &limits).expect("room");
+                let levels = levels(&nodes[..used]);
+                assert!(levels <= MAX_DEPTH, "{ratio} {leaf_max}: {levels}");
+                deepest = deepest.max(levels);
+            }
+        }
+        assert!(deepest > 55, "the series is no test: {deepest}");
     }
 }

@@ -121,7 +121,7 @@ impl Next {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::block::leaf::TriangleBlock;
+    use crate::block::leaf::{KIND_TRIANGLES, SphereBlock, TriangleBlock};
     use crate::math::Aabb;
 
     const LEAF: BvhNode = BvhNode { lower: [0.0; 3], first: 1 << 30, upper: [1.0; 3], lanes: 1 };
@@ -159,6 +159,98 @@ mod tests {
         {
             assert!(!is_sound(&[BvhNode { first, lanes, ..LEAF }, unused]), "{first:x} {lanes:x}");
         }
+    }
+
+    /// A bundle with these children.
+    fn bundle(children: &[ChildRef]) -> Bundle<4> {
+        let mut bundle = Bundle::EMPTY;
+        bundle.refs[..children.len()].copy_from_slice(children);
+        for wall in &mut bundle.walls {
+            wall[..children.len()].fill(1.0);
+        }
+        bundle
+    }
+
+    fn inner_of(number: u32) -> ChildRef {
+        ChildRef::bundle(number)
+    }
+
+    fn triangles(number: u32) -> ChildRef {
+        ChildRef::leaf(KIND_TRIANGLES, number)
+    }
+
+    fn spheres(number: u32) -> ChildRef {
+        ChildRef::leaf(KIND_SPHERES, number)
+    }
+
+    /// Whether these bundles are a tree over so many blocks of each kind.
+    fn are_sound(bundles: &[Bundle<4>], triangle_blocks: usize, sphere_blocks: usize) -> bool {
+        let triangle_blocks = std::vec![TriangleBlock::EMPTY; triangle_blocks];
+        let sphere_blocks = std::vec![SphereBlock::EMPTY; sphere_blocks];
+        let (triangle_blocks, sphere_blocks) = (&triangle_blocks[..], &sphere_blocks[..]);
+        bundles_are_sound(bundles, &Leaves { triangle_blocks, sphere_blocks, prim_ids: &[] })
+    }
+
+    #[test]
+    fn trees_of_bundles_are_told_from_other_graphs() {
+        let leaf = bundle(&[triangles(0)]);
+        assert!(are_sound(&[leaf], 1, 0));
+        let top = bundle(&[inner_of(1), inner_of(2)]);
+        let (a, b) = (bundle(&[inner_of(3)]), bundle(&[triangles(1)]));
+        assert!(are_sound(&[top, a, b, leaf], 2, 0), "siblings, then the first one's children");
+        assert!(!are_sound(&[], 0, 0), "no root");
+        assert!(!are_sound(&[bundle(&[])], 0, 0), "a bundle of nothing");
+        assert!(!are_sound(&[bundle(&[inner_of(0)])], 0, 0), "a bundle that is its own child");
+        let looped = [bundle(&[inner_of(1)]), bundle(&[inner_of(1)])];
+        assert!(!are_sound(&looped, 0, 0), "a bundle that is its own parent");
+        let back = [bundle(&[inner_of(1)]), bundle(&[inner_of(0)])];
+        assert!(!are_sound(&back, 0, 0), "a way back to the root");
+        assert!(!are_sound(&[bundle(&[inner_of(1), inner_of(1)]), leaf], 1, 0), "two parents");
+        assert!(!are_sound(&[bundle(&[inner_of(1)])], 0, 0), "a child that is not there");
+        assert!(!are_sound(&[leaf, leaf], 1, 0), "a bundle without a parent");
+        assert!(!are_sound(&[bundle(&[inner_of(7)]), leaf], 1, 0), "a child far away");
+        let crossed = bundle(&[inner_of(2), inner_of(1)]);
+        assert!(!are_sound(&[crossed, a, b, leaf], 2, 0), "children in another order");
+        assert!(!are_sound(&[bundle(&[inner_of(2)]), leaf, leaf], 1, 0), "a gap");
+        let later = [top, b, a, bundle(&[triangles(0)])];
+        assert!(!are_sound(&later, 2, 0), "children of the second before those of the first");
+    }
+
+    #[test]
+    fn each_leaf_block_has_one_place() {
+        let both = bundle(&[triangles(0), spheres(0), triangles(1), spheres(1)]);
+        assert!(are_sound(&[both], 2, 2));
+        assert!(!are_sound(&[both], 3, 2), "a block without a leaf");
+        assert!(!are_sound(&[both], 2, 3), "a block without a leaf");
+        assert!(!are_sound(&[both], 1, 2), "a leaf without a block");
+        assert!(!are_sound(&[bundle(&[triangles(0), triangles(0)])], 1, 0), "a block twice");
+        assert!(!are_sound(&[bundle(&[triangles(1), triangles(0)])], 2, 0), "another order");
+        assert!(!are_sound(&[bundle(&[triangles(1)])], 1, 0), "a gap");
+        let apart = [bundle(&[inner_of(1), triangles(0)]), bundle(&[triangles(0)])];
+        assert!(!are_sound(&apart, 1, 0), "a block in two bundles");
+    }
+
+    #[test]
+    fn empty_lanes_come_last_and_are_empty() {
+        let mut holed = bundle(&[triangles(0), triangles(1), triangles(2)]);
+        assert!(are_sound(&[holed], 3, 0));
+        holed.refs[1] = ChildRef::NONE;
+        assert!(!are_sound(&[holed], 2, 0), "a hole");
+        for wall in 0..6 {
+            let mut open = bundle(&[triangles(0), triangles(1), triangles(2)]);
+            open.walls[wall][3] = 0.0;
+            assert!(!are_sound(&[open], 3, 0), "wall {wall}");
+        }
+    }
+
+    #[test]
+    fn bundles_deeper_than_the_stack_are_refused() {
+        let chain = |depth: u32| {
+            let inner = (1..depth).map(|level| bundle(&[inner_of(level)]));
+            inner.chain([bundle(&[triangles(0)])]).collect::<std::vec::Vec<_>>()
+        };
+        assert!(are_sound(&chain(MAX_DEPTH as u32), 1, 0));
+        assert!(!are_sound(&chain(MAX_DEPTH as u32 + 1), 1, 0));
     }
 
     #[test]

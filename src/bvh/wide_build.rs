@@ -3,7 +3,8 @@
 use super::collapse::{Shapes, choose};
 use super::compact;
 use super::emit::{BEGINS, Chosen, Sizes};
-use super::tree::{Areas, Limits, PrimRef, gather, grow, leaf_budget};
+use super::split::Areas;
+use super::tree::{Limits, PrimRef, gather, grow, leaf_budget};
 use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
@@ -36,15 +37,13 @@ impl Places {
     fn new(survey: &Survey, census: &Census, size: usize) -> Option<Places> {
         let mixed = census.triangle_count > 0 && census.sphere_count > 0;
         let prims = census.hittable() as usize;
-        let [most, least] = [true, false].map(|full| leaf_budget(prims, mixed, full));
-        let front = front(survey)?;
-        let size = size / ALIGNMENT * ALIGNMENT;
-        let refs = prims.checked_mul(size_of::<PrimRef>())?;
-        let pair = 2 * size_of::<BvhNode>();
-        let room = size.checked_sub(front)?.checked_sub(refs)? / pair;
-        let leaves = most.min(room);
-        let nodes = size - leaves * pair;
-        (leaves >= least).then_some(Places { refs: nodes - refs, nodes, leaves })
+        // More leaves, a half of the primitives or all, made no ray faster: the collapse puts them
+        // together again.
+        let leaves = leaf_budget(prims, mixed, false);
+        let nodes = (size / ALIGNMENT * ALIGNMENT)
+            .checked_sub(leaves.checked_mul(2 * size_of::<BvhNode>())?)?;
+        let refs = nodes.checked_sub(prims.checked_mul(size_of::<PrimRef>())?)?;
+        (refs >= front(survey)?).then_some(Places { refs, nodes, leaves })
     }
 }
 
@@ -55,18 +54,21 @@ fn front(survey: &Survey) -> Option<usize> {
 }
 
 /// The bytes for a good tree of bundles, and the bytes below which there is no tree at all.
+///
+/// The first is the larger of two: what growing takes, which is all that a scan or a terrain needs,
+/// and the finished block of a soup, in which leaf blocks hold 3.55 triangles.
 pub(crate) fn needs_wide(
     survey: &Survey,
     census: &Census,
     width: u32,
 ) -> Result<(usize, usize), BuildError> {
     let (compact, minimum) = compact::needs(survey, census)?;
-    let blocks = census.triangle_count.div_ceil(4) + census.sphere_count.div_ceil(8);
-    let sizes = Sizes {
-        bundles: 1 + 2 * blocks / width,
-        triangle_blocks: census.triangle_count.div_ceil(4),
-        sphere_blocks: census.sphere_count.div_ceil(8),
-    };
+    let triangle_blocks = (u64::from(census.triangle_count) * 20).div_ceil(71) as u32;
+    let sphere_blocks = census.sphere_count.div_ceil(4);
+    // Three lanes for two leaf blocks.
+    let lanes = 3 * u64::from(triangle_blocks + sphere_blocks) / 2;
+    let bundles = 2 + lanes / u64::from(width);
+    let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks };
     let finished = counts(survey, census, &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
     Ok((compact.max(finished.end), minimum))
 }
@@ -125,7 +127,7 @@ where
     let areas = Areas::new(&census.bounds);
     let whole = areas.of(&census.bounds);
     let mean = whole / prims as f32;
-    for price in [whole / (1u64 << 36) as f32, mean, 8.0 * mean, 64.0 * mean, whole] {
+    for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
         let sizes = scratch.choose::<W>(scene, survey, areas, price, bytes)?;
         let counts = counts(survey, census, &sizes, W as u32);
         let at = counts.offsets()?;
@@ -159,7 +161,7 @@ fn grow_tree(
     // From the last on, each id goes to the end of the refs' place, onto refs that are done.
     let words = storage::view_mut::<u32>(front, places.refs, 8 * prims)?;
     for i in (0..prims).rev() {
-        words[7 * prims + i] = words[8 * i + 3];
+        words[7 * prims + i] = words[8 * i + PrimRef::ID];
     }
     Some(count)
 }

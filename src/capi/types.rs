@@ -11,15 +11,16 @@ pub const RT_QUALITY_FAST: u32 = 1;
 /// For a structure that is built once. Unsupported so far.
 pub const RT_QUALITY_BEST: u32 = 2;
 
-/// `RtBuildOptions.layout`: what suits this machine.
+/// `RtBuildOptions.layout`: bundles of 16. The block says how it is read, not the machine: every
+/// machine reads every layout.
 pub const RT_LAYOUT_AUTOMATIC: u32 = 0;
-/// Binary nodes of 32 bytes: the least memory.
+/// Binary nodes of 32 bytes: the least memory and the least stack, for small machines.
 pub const RT_LAYOUT_COMPACT: u32 = 1;
-/// Bundles of 4 boxes. Unsupported so far.
+/// Bundles of 4 boxes over whole leaf blocks. With little memory the layout may become compact after all.
 pub const RT_LAYOUT_WIDE_4: u32 = 4;
-/// Bundles of 8 boxes. Unsupported so far.
+/// Bundles of 8 boxes over whole leaf blocks.
 pub const RT_LAYOUT_WIDE_8: u32 = 8;
-/// Bundles of 16 boxes. Unsupported so far.
+/// Bundles of 16 boxes over whole leaf blocks.
 pub const RT_LAYOUT_WIDE_16: u32 = 16;
 
 /// `RtBuildOptions.plain_list`: for a handful of primitives, which no structure makes faster.

@@ -10,7 +10,7 @@ use super::DILATION;
 use super::cells::CellRay;
 use super::steps::{Real, Steps};
 use crate::block::cells::GridHead;
-use crate::math::Aabb;
+use crate::math::{Aabb, wide};
 use crate::math::rounding::UNIT;
 use crate::ray::{Interval, PreparedRay, Ray, WideSlab};
 
@@ -42,7 +42,7 @@ fn point_in(random: &mut Random, aabb: &Aabb) -> [f32; 3] {
 /// From within `distance` grids to a point of the box.
 fn ray_to(random: &mut Random, aabb: &Aabb, distance: i32) -> Option<PreparedRay> {
     let (from, to) = (point_in(random, aabb), point_in(random, aabb));
-    let size = aabb.extent().max_element();
+    let size = (wide(aabb.upper) - wide(aabb.lower)).max_element();
     let away = 2f64.powi(random.below(distance as usize + 10) as i32 - 9);
     let away = if random.below(4) == 0 { 0.0 } else { away * size };
     let turn = random.direction();

@@ -29,11 +29,15 @@ impl Aabb {
         aabb
     }
 
-    /// Grows the box until it holds `other`.
+    /// Grows the box until it holds `other`. Of equal zeros the box's own stays, on every machine.
     pub fn add(&mut self, other: &Aabb) {
         for k in 0..3 {
-            self.lower[k] = self.lower[k].min(other.lower[k]);
-            self.upper[k] = self.upper[k].max(other.upper[k]);
+            if other.lower[k] < self.lower[k] {
+                self.lower[k] = other.lower[k];
+            }
+            if other.upper[k] > self.upper[k] {
+                self.upper[k] = other.upper[k];
+            }
         }
     }
 
@@ -42,21 +46,10 @@ impl Aabb {
         wide(self.lower) + wide(self.upper)
     }
 
-    /// Lengths of the edges; at most 1e39, so that products stay finite whatever the box.
-    pub fn extent(&self) -> DVec3 {
-        (wide(self.upper) - wide(self.lower)).min(DVec3::splat(1e39)).max(DVec3::ZERO)
-    }
-
     /// The largest coordinate in size; 0 for the empty box.
     pub fn reach(&self) -> f32 {
         let corners = self.lower.into_iter().chain(self.upper);
         if self.lower[0] > self.upper[0] { 0.0 } else { corners.fold(0.0, |m, x| x.abs().max(m)) }
-    }
-
-    /// Half the surface area.
-    pub fn half_area(&self) -> f64 {
-        let e = self.extent();
-        e.x * e.y + e.y * e.z + e.z * e.x
     }
 }
 

@@ -6,7 +6,7 @@ use raykern::{
     Accel, Backend, BuildOptions, Hit, Layout, OwnedAccel, PlainList, QueryOptions, Ray, Scene,
 };
 use raykern_harness::make;
-use raykern_harness::model::Model;
+use raykern_harness::model::{Model, TriangleMesh};
 
 /// List, grid and BVH in every layout over one scene, each forced.
 pub struct All([(&'static str, OwnedAccel); 6]);
@@ -77,6 +77,11 @@ pub fn odd_models() -> Vec<(&'static str, Model)> {
     degenerate.meshes[0].vertices[7] = [f32::NAN, 0.0, f32::INFINITY];
     let mut stadium: Model = make::sphere(500).into();
     stadium.meshes.push(make::plane(50).placed(1e5, [-5e4, -5e4, -1.0]));
+    // Each triangle a quarter of the one before: a tree is about as deep as they are many.
+    let mut peeled = TriangleMesh::default();
+    for i in 0..40 {
+        peeled.append(&make::plane(2).placed(0.25f64.powi(i), [0.25f64.powi(i), 0.0, 0.0]));
+    }
     let mut mixed = make::spheres(100, 2);
     mixed.sphere_sets.push(vec![[0.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.5, -1.0], [0.5, 0.5, 0.5, 0.3]]);
     mixed.sphere_sets.push(vec![[0.5, 0.5, 0.5, 0.3], [f32::NAN, 0.0, 0.0, 1.0]]);
@@ -88,6 +93,7 @@ pub fn odd_models() -> Vec<(&'static str, Model)> {
         ("doubled", doubled),
         ("degenerate", degenerate),
         ("stadium", stadium),
+        ("peeled", peeled.into()),
         ("mixed", mixed),
     ]
 }
