@@ -10,7 +10,7 @@ use crate::query::{
     QueryOptions, Watch, Watertight, flat_number, geometry_of,
 };
 use crate::ray::{Hit, NONE, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
-use crate::simd::{self, Kernel, Simd};
+use crate::simd::{self, Kernel, Scalar, Simd};
 #[cfg(feature = "capi")]
 use crate::storage;
 use crate::surface::{self, Surface};
@@ -294,7 +294,8 @@ impl<'m> Accel<'m> {
     /// Runs the one traversal of the structure at hand with the best instructions there are.
     #[inline]
     fn ask<Q: Query>(&self, ray: &PreparedRay, query: &mut Q) -> bool {
-        simd::dispatch(Ask { accel: self, ray, query })
+        let ask = Ask { accel: self, ray, query };
+        if Q::PORTABLE { ask.run(Scalar) } else { simd::dispatch(ask) }
     }
 
     fn leaves(&self) -> Leaves<'m> {
@@ -337,9 +338,16 @@ impl<Q: Query> Kernel for Ask<'_, '_, Q> {
         // Boxes in `f32` where the frame allows.
         match NarrowSlab::new(ray) {
             Some(slab) => boxes(s, block, &leaves, ray, &slab, query),
-            None => boxes(s, block, &leaves, ray, &WideSlab::new(ray), query),
+            None => wide_boxes(block, &leaves, ray, query),
         }
     }
+}
+
+/// For rays and scenes at the ends of the floats. They are so rare that portable code will do.
+#[cold]
+#[inline(never)]
+fn wide_boxes<Q: Query>(block: &Block, leaves: &Leaves, ray: &PreparedRay, query: &mut Q) -> bool {
+    boxes(Scalar, block, leaves, ray, &WideSlab::new(ray), query)
 }
 
 #[inline(always)]

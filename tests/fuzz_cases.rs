@@ -77,7 +77,26 @@ fn fronts_that_round_to_backs() -> [Case; 2] {
     ]
 }
 
-/// Known and not mended: scene, and the normal that its first question must find, roughly.
+/// Two roots of a sphere that round to one: the watertight mode took the sphere for touched and left out
+/// both when one was to be skipped.
+fn roots_that_round_to_one() -> [Case; 2] {
+    let skip =
+        |prim| QueryOptions { skip: Some(PrimId { prim, geometry: 0, instance: NONE }), ..DEFAULT };
+    let of = |spheres: Vec<[f32; 4]>, ray: Ray, options| Case {
+        model: Model { meshes: vec![], sphere_sets: vec![spheres] },
+        masks: vec![0],
+        questions: vec![(ray, options)],
+    };
+    let far = [4.0, 15649651.0, -6973005300.0];
+    let beyond = Ray::new([7.0533445e-30, 4.0, 4.0], far).with_limits(1.0, f32::INFINITY);
+    let along = Ray::new([1.0, 1.0, 2.0], [0.0, -6.4986845e35, -4.814825e-34]);
+    [
+        of(vec![[4.0, 15649655.0, -6973005300.0, 3.0]], beyond, skip(0)),
+        of(vec![[1.0, 1.0, 0.0, 2.0]], along, QueryOptions { facing: Facing::Back, ..skip(0) }),
+    ]
+}
+
+/// A scene, and the normal that its first question must find, roughly.
 fn normals() -> [(&'static str, Case, [f64; 3]); 3] {
     let third = 3f64.sqrt().recip();
     let half = 2f64.sqrt().recip();
@@ -91,7 +110,8 @@ fn normals() -> [(&'static str, Case, [f64; 3]); 3] {
 fn scenes_found() -> Vec<(&'static str, Case)> {
     let normals = normals().into_iter().map(|(name, case, _)| (name, case));
     let fronts = fronts_that_round_to_backs().into_iter().map(|case| ("fronts", case));
-    normals.chain(fronts).collect()
+    let roots = roots_that_round_to_one().into_iter().map(|case| ("roots", case));
+    normals.chain(fronts).chain(roots).collect()
 }
 
 fn blocks_found() -> Vec<(&'static str, Damage)> {

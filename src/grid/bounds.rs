@@ -10,8 +10,8 @@ use super::DILATION;
 use super::cells::CellRay;
 use super::steps::{Real, Steps};
 use crate::block::cells::GridHead;
-use crate::math::{Aabb, wide};
 use crate::math::rounding::UNIT;
+use crate::math::{Aabb, wide};
 use crate::ray::{Interval, PreparedRay, Ray, WideSlab};
 
 /// A grid over a box that may be flat, far from zero, or both.

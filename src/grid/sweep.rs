@@ -5,7 +5,7 @@ use super::walk::{Cells, visit};
 use crate::math::rounding::UNIT;
 use crate::query::Query;
 use crate::ray::{Interval, PreparedRay, WideSlab};
-use crate::simd::Simd;
+use crate::simd::Scalar;
 
 /// Offers `query` what is listed in each cell that the ray comes near, layer by layer along its fastest
 /// axis; true when that ended the search.
@@ -14,9 +14,7 @@ use crate::simd::Simd;
 /// passed, are off by at most `6 u C` cells as in [`Steps`](super::steps::Steps). The ray is therefore taken
 /// as `16 u C` cells thick, which may be many; when it is thicker than half the grid every block is
 /// tested through its box instead.
-#[inline(always)]
-pub(super) fn sweep<S: Simd, Q: Query>(
-    s: S,
+pub(super) fn sweep<Q: Query>(
     cells: &Cells,
     cell_ray: &CellRay,
     part: Interval<f64>,
@@ -28,7 +26,7 @@ pub(super) fn sweep<S: Simd, Q: Query>(
     let widest = resolution[0].max(resolution[1]).max(resolution[2]);
     // Written so that a NaN or an infinity comes here.
     if !(2.0 * pad < f64::from(widest)) {
-        return cells.leaves.intersect_all(s, ray, &WideSlab::new(ray), query);
+        return cells.leaves.intersect_all(Scalar, ray, &WideSlab::new(ray), query);
     }
     let major = cell_ray.major();
     let layers = resolution[major];
@@ -45,7 +43,7 @@ pub(super) fn sweep<S: Simd, Q: Query>(
         }
         let mut ranges = [0, 1, 2].map(|k| cells_at(cell_ray, k, times, pad));
         ranges[major] = [layer, layer];
-        if visit_all(s, cells, ranges, ray, query) {
+        if visit_all(cells, ranges, ray, query) {
             return true;
         }
     }
@@ -68,9 +66,7 @@ fn cells_at(ray: &CellRay, axis: usize, times: Interval<f64>, pad: f64) -> [u32;
     [((a.min(b) - pad) as u32).min(last), ((a.max(b) + pad) as u32).min(last)]
 }
 
-#[inline(always)]
-fn visit_all<S: Simd, Q: Query>(
-    s: S,
+fn visit_all<Q: Query>(
     cells: &Cells,
     [x, y, z]: [[u32; 2]; 3],
     ray: &PreparedRay,
@@ -79,7 +75,7 @@ fn visit_all<S: Simd, Q: Query>(
     for k in z[0]..=z[1] {
         for j in y[0]..=y[1] {
             for i in x[0]..=x[1] {
-                if visit(s, cells, [i, j, k], ray, query) {
+                if visit(Scalar, cells, [i, j, k], ray, query) {
                     return true;
                 }
             }

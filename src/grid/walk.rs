@@ -6,8 +6,8 @@ use super::sweep::sweep;
 use crate::block::cells::{EMPTY, GridHead, Run, run_start};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
-use crate::ray::{PreparedRay, WideSlab};
-use crate::simd::Simd;
+use crate::ray::{Interval, PreparedRay, WideSlab};
+use crate::simd::{Scalar, Simd};
 
 /// The parts of a block that a walk reads.
 #[derive(Clone, Copy)]
@@ -41,10 +41,25 @@ pub(crate) fn walk<S: Simd, Q: Query>(
     let cell_ray = CellRay::new(cells.head, ray);
     if cell_ray.steps_safely::<f32>() {
         step(s, cells, Steps::<f32>::new(&cell_ray, part), ray, query)
-    } else if cell_ray.steps_safely::<f64>() {
-        step(s, cells, Steps::<f64>::new(&cell_ray, part), ray, query)
     } else {
-        sweep(s, cells, &cell_ray, part, ray, query)
+        from_afar(cells, &cell_ray, part, ray, query)
+    }
+}
+
+/// The walk of a ray from so far away that `f32` would err. They are so rare that portable code will do.
+#[cold]
+#[inline(never)]
+fn from_afar<Q: Query>(
+    cells: &Cells,
+    cell_ray: &CellRay,
+    part: Interval<f64>,
+    ray: &PreparedRay,
+    query: &mut Q,
+) -> bool {
+    if cell_ray.steps_safely::<f64>() {
+        step(Scalar, cells, Steps::<f64>::new(cell_ray, part), ray, query)
+    } else {
+        sweep(cells, cell_ray, part, ray, query)
     }
 }
 

@@ -37,6 +37,7 @@ impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
     type Watch = W;
     const FUSED: bool = D::FUSED;
     const ORDERED: bool = true;
+    const PORTABLE: bool = W::COUNTS;
 
     fn t_bound(&self) -> f32 {
         self.t_bound
@@ -88,6 +89,7 @@ impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
     type Watch = W;
     const FUSED: bool = D::FUSED;
     const ORDERED: bool = false;
+    const PORTABLE: bool = W::COUNTS;
 
     fn t_bound(&self) -> f32 {
         self.t_max
@@ -140,6 +142,8 @@ impl<D: Decide> Query for Locate<D> {
     type Watch = ();
     const FUSED: bool = D::FUSED;
     const ORDERED: bool = true;
+    // Hits of the watertight mode, which is tried second, are rarely looked up.
+    const PORTABLE: bool = !D::FUSED;
 
     fn t_bound(&self) -> f32 {
         self.t_max

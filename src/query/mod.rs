@@ -37,6 +37,9 @@ pub struct Counts {
 
 /// Looks on while a query is answered: nobody, or [`Counts`].
 pub(crate) trait Watch {
+    /// Whether somebody looks.
+    const COUNTS: bool = false;
+
     /// A box or a cell was looked at.
     fn step(&mut self) {}
     /// A leaf block was opened, to test this many lanes.
@@ -52,6 +55,8 @@ pub(crate) trait Watch {
 impl Watch for () {}
 
 impl Watch for &mut Counts {
+    const COUNTS: bool = true;
+
     fn step(&mut self) {
         self.steps += 1;
     }
@@ -108,6 +113,9 @@ pub(crate) trait Query {
 
     /// Whether near nodes had better come first.
     const ORDERED: bool;
+
+    /// Whether portable code is fast enough for this question, which saves its code for every backend.
+    const PORTABLE: bool;
 
     /// Nothing beyond this `t` of the frame is of interest any more.
     fn t_bound(&self) -> f32;

@@ -86,7 +86,8 @@ impl Decide for Watertight {
                 place: lane.place,
                 front: Some(root == 0),
                 root,
-                skippable: root == nearest || lane.detail.t[0] == lane.detail.t[1],
+                // Roots that round to one may still be two, of which one stays.
+                skippable: root == nearest,
             })
         })
     }
