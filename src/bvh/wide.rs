@@ -28,7 +28,7 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
         while !at.is_leaf() {
             let Some(bundle) = bundles.get(at.bundle_number()) else { return false };
             query.watch().step();
-            let (mask, near) = if Q::FUSED {
+            let (mask, near) = if Q::ANY_BOXES {
                 slab.lanes::<S, true, W>(s, &bundle.walls, t_bound)
             } else {
                 slab.lanes::<S, false, W>(s, &bundle.walls, t_bound)

@@ -14,6 +14,43 @@ pub(crate) struct TriangleMeeting {
     pub front: bool,
     /// Whether it took real arithmetic to know.
     pub exact: bool,
+    /// Where on the triangle it is, as far as that was asked.
+    pub feature: Feature,
+}
+
+/// A part of a triangle that a line was found to pass through.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Feature {
+    /// Any point.
+    Face,
+    /// A point of the edge between two vertices.
+    Edge([[f32; 3]; 2]),
+    /// A vertex.
+    Vertex([f32; 3]),
+}
+
+impl Feature {
+    /// Whether one line through both meets both at the same `t`: where neighbours share a vertex or
+    /// an edge. False says nothing.
+    pub fn is_same(&self, other: &Feature) -> bool {
+        match (self, other) {
+            (Feature::Vertex(p), Feature::Vertex(q)) => p == q,
+            (Feature::Edge([a, b]), Feature::Edge([c, d])) => {
+                (a == c && b == d) || (a == d && b == c)
+            }
+            _ => false,
+        }
+    }
+
+    /// Whether a triangle with these corners has it: then a line through it meets the triangle there or,
+    /// parallel to it, nowhere.
+    pub fn is_part_of(&self, corners: &[[f32; 3]; 3]) -> bool {
+        match self {
+            Feature::Face => false,
+            Feature::Edge(ends) => ends.iter().all(|end| corners.contains(end)),
+            Feature::Vertex(vertex) => corners.contains(vertex),
+        }
+    }
 }
 
 /// The meeting of the line with the closed triangle, whatever its `t`.
@@ -36,11 +73,9 @@ pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeti
         return None;
     }
     let sure = least > bound || most < -bound;
-    if !sure && !exactly_met(line, triangle) {
-        return None;
-    }
+    let feature = if sure { Feature::Face } else { exactly_met(line, triangle)? };
     let meeting = plane(line, triangle)?;
-    Some(TriangleMeeting { exact: meeting.exact || !sure, ..meeting })
+    Some(TriangleMeeting { exact: meeting.exact || !sure, feature, ..meeting })
 }
 
 /// Twice the volumes over the edges opposite to the second, the third and the first vertex.
@@ -61,10 +96,22 @@ pub(super) fn volume_error(line: &Line, triangle: [[f32; 3]; 3]) -> f64 {
     gamma(10) * sum_abs(wide(line.direction)) * 2.0 * reach * side
 }
 
-/// Whether all volumes that are not zero have one sign.
-fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> bool {
+/// Which part of the triangle the line meets: it does when all volumes that are not zero have one sign.
+fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Feature> {
     let volumes = exact::volumes(line, triangle);
-    volumes.iter().any(|v| *v < 0.0) != volumes.iter().any(|v| *v > 0.0)
+    let met = volumes.iter().any(|v| *v < 0.0) != volumes.iter().any(|v| *v > 0.0);
+    // The line passes through the edge opposite to a vertex whose volume is zero.
+    let [b, c, a] = volumes.map(|volume| volume == 0.0);
+    let [p, q, r] = triangle;
+    met.then_some(match (a, b, c) {
+        (false, false, false) => Feature::Face,
+        (true, false, false) => Feature::Edge([q, r]),
+        (false, true, false) => Feature::Edge([r, p]),
+        (false, false, true) => Feature::Edge([p, q]),
+        (_, true, true) => Feature::Vertex(p),
+        (true, _, true) => Feature::Vertex(q),
+        (true, true, _) => Feature::Vertex(r),
+    })
 }
 
 /// The weights of the second and the third vertex where the line meets the triangle, by one sequence
@@ -92,13 +139,19 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
         let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
         // A hundredth for the divisor's own error, and the rounding of the quotient.
         let t_error = 1.01 * t_error + 2.0 * UNIT * t.abs();
-        return Some(TriangleMeeting { t, t_error, front: along < 0.0, exact: false });
+        return Some(TriangleMeeting {
+            t,
+            t_error,
+            front: along < 0.0,
+            exact: false,
+            feature: Feature::Face,
+        });
     }
     let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
     let (t, t_error) = distance.approximate();
     // None of the volumes is of the other sign.
     let front = exact::volumes(line, triangle).iter().any(|v| *v < 0.0);
-    Some(TriangleMeeting { t, t_error, front, exact: true })
+    Some(TriangleMeeting { t, t_error, front, exact: true, feature: Feature::Face })
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.
@@ -154,6 +207,32 @@ mod tests {
         }
         assert!(shot([0.5, 0.5f32.next_up(), 1.0], [0.0, 0.0, -1.0]).is_none());
         assert!(shot([0.25, -1e-30, 1.0], [0.0, 0.0, -1.0]).is_none());
+    }
+
+    #[test]
+    fn vertices_and_edges_are_told() {
+        let feature = |x: f32, y: f32| {
+            let line = Line { origin: [x, y, 1.0], direction: [0.0, 0.0, -1.0] };
+            meet(&line, TRIANGLE).expect("a hit").feature
+        };
+        let [a, b, c] = TRIANGLE;
+        for (x, y, expected) in [
+            (0.0, 0.0, Feature::Vertex(a)),
+            (1.0, 0.0, Feature::Vertex(b)),
+            (0.0, 1.0, Feature::Vertex(c)),
+            (0.5, 0.0, Feature::Edge([b, a])),
+            (0.5, 0.5, Feature::Edge([c, b])),
+            (0.0, 0.25, Feature::Edge([a, c])),
+        ] {
+            assert!(feature(x, y).is_same(&expected), "{x} {y}: {:?}", feature(x, y));
+        }
+        assert!(matches!(feature(0.25, 0.25), Feature::Face));
+        assert!(!feature(0.5, 0.0).is_same(&Feature::Edge([a, c])));
+        assert!(!feature(0.0, 0.0).is_same(&Feature::Vertex(b)));
+        let beside = [a, b, [0.0, -1.0, 0.0]];
+        assert!(feature(0.0, 0.0).is_part_of(&beside) && feature(0.5, 0.0).is_part_of(&beside));
+        assert!(!feature(0.0, 1.0).is_part_of(&beside) && !feature(0.5, 0.5).is_part_of(&beside));
+        assert!(!feature(0.25, 0.25).is_part_of(&TRIANGLE));
     }
 
     #[test]

@@ -10,7 +10,7 @@ pub(crate) use validate::leaves_are_sound;
 
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SphereBlock, TriangleBlock};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
-use crate::ray::{PreparedRay, Slab};
+use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Depths};
 use crate::simd::Simd;
 
@@ -111,6 +111,11 @@ impl Leaves<'_> {
         query.watch().block(lanes.count_ones());
         let t_bound = query.t_bound();
         let found = sieve::triangles(s, ray, &Depths::new(ray, t_bound), block, lanes);
+        // Many in doubt: the block is small for the precision of the sieve, and of the boxes above it.
+        let in_doubt = (found.candidates & lanes & !found.sure).count_ones();
+        if Q::ANY_BOXES && in_doubt > 2 && !is_near(ray, block, t_bound) {
+            return false;
+        }
         for lane in Lanes(found.candidates & lanes) {
             let corners = block.triangle(lane);
             // What was found in a lane before may already be nearer.
@@ -158,6 +163,12 @@ impl Leaves<'_> {
     fn prim_id(&self, first: u32, lane: usize) -> u32 {
         self.prim_ids.get(first as usize + lane).copied().unwrap_or(crate::ray::NONE)
     }
+}
+
+/// Whether the ray comes near a block, in `f64`.
+#[inline(never)]
+fn is_near(ray: &PreparedRay, block: &TriangleBlock, t_bound: f32) -> bool {
+    !WideSlab::new(ray).part(&block.aabb, t_bound).is_empty()
 }
 
 /// The numbers of the bits that are set, from the lowest.

@@ -35,7 +35,7 @@ impl<'m, D: Decide, W: Watch> Closest<'m, D, W> {
 
 impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
     type Watch = W;
-    const FUSED: bool = D::FUSED;
+    const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = true;
     const PORTABLE: bool = W::COUNTS;
 
@@ -45,8 +45,8 @@ impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
 
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
         // What was offered once is not computed again.
-        let known = self.best.as_ref().is_some_and(|best| best.prim() == lane.prim);
-        if !known
+        let known = |best: &D::Met| best.prim() == lane.prim || D::is_surely_after(lane, best);
+        if !self.best.as_ref().is_some_and(known)
             && self.filter.sees(lane.prim, true)
             && let Some(met) = D::triangle(ray, lane, &mut self.watch)
         {
@@ -87,7 +87,7 @@ impl<'m, D: Decide, W: Watch> Any<'m, D, W> {
 
 impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
     type Watch = W;
-    const FUSED: bool = D::FUSED;
+    const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = false;
     const PORTABLE: bool = W::COUNTS;
 
@@ -140,10 +140,10 @@ impl<D: Decide> Locate<D> {
 
 impl<D: Decide> Query for Locate<D> {
     type Watch = ();
-    const FUSED: bool = D::FUSED;
+    const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = true;
     // Hits of the watertight mode, which is tried second, are rarely looked up.
-    const PORTABLE: bool = !D::FUSED;
+    const PORTABLE: bool = !D::ANY_BOXES;
 
     fn t_bound(&self) -> f32 {
         self.t_max

@@ -4,6 +4,7 @@ use core::cmp::Ordering;
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, Within, clamped_weights, within};
 use crate::exact::{Distance, Meeting};
+use crate::interval::triangle::Feature;
 use crate::interval::{sphere, triangle};
 use crate::ray::{Interval, PreparedRay};
 
@@ -18,6 +19,8 @@ pub(crate) struct ExactMet {
     t_error: f64,
     /// What is met, from which the real `t` follows.
     meeting: Meeting,
+    /// Where on a triangle.
+    feature: Feature,
     prim: u32,
     place: (u32, u32),
     front: bool,
@@ -97,7 +100,7 @@ impl ExactMemory {
 
 impl Decide for Exact {
     type Met = ExactMet;
-    const FUSED: bool = true;
+    const ANY_BOXES: bool = true;
     type Memory = ExactMemory;
 
     fn triangle(
@@ -119,6 +122,7 @@ impl Decide for Exact {
             t: meeting.t,
             t_error: meeting.t_error,
             meeting: Meeting::Triangle(lane.corners),
+            feature: meeting.feature,
             prim: lane.prim,
             place: lane.place,
             front: meeting.front,
@@ -143,6 +147,7 @@ impl Decide for Exact {
                 t: both.t[root],
                 t_error: both.t_error[root],
                 meeting: Meeting::Sphere { centre, radius, root },
+                feature: Feature::Face,
                 prim: lane.prim,
                 place: lane.place,
                 front: root == 0,
@@ -168,7 +173,8 @@ impl Decide for Exact {
             return false;
         }
         let first = met.prim < best.prim;
-        if met.meeting.surely_equal(&best.meeting) {
+        // Neighbours that share what the ray passes through, and doubled surfaces.
+        if met.feature.is_same(&best.feature) || met.meeting.surely_equal(&best.meeting) {
             return first;
         }
         watch.exact();
@@ -180,6 +186,13 @@ impl Decide for Exact {
             // Neither number exists: only blocks of foreign bytes come here.
             None => met.t < best.t,
         }
+    }
+
+    fn is_surely_after(lane: &TriangleLane, best: &ExactMet) -> bool {
+        // Cheaper than finding out whether it is met: neighbours at a vertex, and doubled surfaces.
+        best.prim < lane.prim
+            && (best.feature.is_part_of(&lane.corners)
+                || best.meeting.surely_equal(&Meeting::Triangle(lane.corners)))
     }
 
     fn t_bound(ray: &PreparedRay, met: &ExactMet) -> f32 {

@@ -108,8 +108,9 @@ pub(crate) struct SphereLane {
 pub(crate) trait Query {
     type Watch: Watch;
 
-    /// Whether nodes may be tested with fused operations: not where that could change the answer.
-    const FUSED: bool;
+    /// Whether the answer is the same however conservatively boxes are tested: then this may be done in any
+    /// way, fused or in `f64`.
+    const ANY_BOXES: bool;
 
     /// Whether near nodes had better come first.
     const ORDERED: bool;
@@ -134,8 +135,8 @@ pub(crate) trait Decide {
     /// A meeting of the ray with a primitive, within the ray's limits as far as this can tell.
     type Met: Copy + Meets;
 
-    /// Whether the answer is the same however conservatively nodes are tested.
-    const FUSED: bool;
+    /// Whether the answer is the same however conservatively boxes are tested.
+    const ANY_BOXES: bool;
 
     /// The meeting with a triangle of which the filter is not sure.
     fn triangle(
@@ -162,6 +163,9 @@ pub(crate) trait Decide {
         memory: &mut Self::Memory,
         watch: &mut impl Watch,
     ) -> bool;
+
+    /// Whether a triangle, if it is met at all, surely comes after `best`.
+    fn is_surely_after(lane: &TriangleLane, best: &Self::Met) -> bool;
 
     /// A `t` of the frame that is not below the real one of `met`, or whatever stands for it.
     fn t_bound(ray: &PreparedRay, met: &Self::Met) -> f32;

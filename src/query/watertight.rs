@@ -44,7 +44,7 @@ impl Meets for WatertightMet {
 
 impl Decide for Watertight {
     type Met = WatertightMet;
-    const FUSED: bool = false;
+    const ANY_BOXES: bool = false;
     type Memory = ();
 
     fn triangle(
@@ -100,6 +100,10 @@ impl Decide for Watertight {
         _: &mut impl Watch,
     ) -> bool {
         met.t < best.t || (met.t == best.t && met.prim < best.prim)
+    }
+
+    fn is_surely_after(_: &TriangleLane, _: &WatertightMet) -> bool {
+        false
     }
 
     fn t_bound(_: &PreparedRay, met: &WatertightMet) -> f32 {
