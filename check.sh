@@ -3,7 +3,7 @@
 # (Debian packages by name). Under 15 minutes on two cores.
 #
 #   ./check.sh            all of it
-#   ./check.sh STEP ...   some of it: format clippy build test docs header c fuzz embree stress compare bench
+#   ./check.sh STEP ...   some of it: format clippy build test backends docs header c fuzz embree stress compare bench
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
@@ -50,6 +50,15 @@ step_build() {
 step_test() {
     cargo test --workspace --features raykern/capi
     cargo test --example compare
+}
+
+# The tests of answers once more with each lower backend; `test` has run them with the best one.
+step_backends() {
+    local backend
+    for backend in scalar bits128 avx2; do
+        RAYKERN_BACKEND=$backend cargo test -q --features capi \
+            --test agree --test exact --test hostile --test laws --test watertight
+    done
 }
 
 step_docs() { RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --features raykern/capi; }
@@ -105,7 +114,7 @@ step_compare() { cargo run --release --example compare -- --runs 2 --budget 20 -
 # The comparison with Embree, cut short: its answers are checked, its times mean nothing here.
 step_bench() { cargo run --release -p raykern-bench --features embree -- --quick; }
 
-steps=(install format clippy build test docs header c fuzz embree stress compare bench)
+steps=(install format clippy build test backends docs header c fuzz embree stress compare bench)
 [ $# -eq 0 ] || steps=("$@")
 for step in "${steps[@]}"; do
     started=$SECONDS
