@@ -2,7 +2,7 @@
 
 use core::cmp::Ordering;
 
-use super::{Decide, Meets, SphereLane, TriangleLane, Watch, Within, clamped_weights, within};
+use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
 use crate::exact::{Distance, Meeting};
 use crate::interval::triangle::Feature;
 use crate::interval::{sphere, triangle};
@@ -220,4 +220,22 @@ impl Decide for Exact {
             Meeting::Sphere { .. } => [0.0; 2],
         }
     }
+}
+
+/// Whether all of an interval lies within the limits, or only a part of it, or none.
+fn within(part: Interval<f64>, t_min: f64, t_max: f64) -> Within {
+    if part.far < t_min || part.near > t_max {
+        Within::None
+    } else if part.near >= t_min && part.far <= t_max {
+        Within::All
+    } else {
+        Within::Part
+    }
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Within {
+    None,
+    Part,
+    All,
 }

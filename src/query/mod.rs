@@ -15,7 +15,7 @@ pub use options::{Facing, Precision, PrimId, QueryOptions};
 pub(crate) use options::{Filter, flat_number, geometry_of};
 pub(crate) use watertight::Watertight;
 
-use crate::ray::{Interval, PreparedRay};
+use crate::ray::PreparedRay;
 use crate::sieve::SphereDetail;
 
 /// What a query did, for charts and heat maps.
@@ -138,7 +138,7 @@ pub(crate) trait Decide {
     /// Whether the answer is the same however conservatively boxes are tested.
     const ANY_BOXES: bool;
 
-    /// The meeting with a triangle of which the filter is not sure.
+    /// The meeting with a triangle that the filter could not reject.
     fn triangle(
         ray: &PreparedRay,
         lane: &TriangleLane,
@@ -196,22 +196,4 @@ fn clamped_weights([u, v]: [f32; 2]) -> [f32; 2] {
     let u = u.max(0.0).min(1.0) + 0.0;
     let v = v.max(0.0).min(1.0 - u) + 0.0;
     [u, v]
-}
-
-/// Whether all of an interval lies within the limits, or only a part of it, or none.
-fn within(part: Interval<f64>, t_min: f64, t_max: f64) -> Within {
-    if part.far < t_min || part.near > t_max {
-        Within::None
-    } else if part.near >= t_min && part.far <= t_max {
-        Within::All
-    } else {
-        Within::Part
-    }
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Within {
-    None,
-    Part,
-    All,
 }

@@ -2,13 +2,11 @@
 
 use glam::Vec3;
 
+use super::TINY;
 use super::vector::{dot, sum_abs};
 use crate::math::float::sqrt32;
 use crate::math::rounding::UNIT32;
 use crate::ray::PreparedRay;
-
-/// Far below every bound on squares in the frame, and far above what underflow can take away.
-const TINY: f32 = 1.0 / (1u128 << 100) as f32;
 
 /// One sphere in `f32`.
 #[derive(Clone, Copy, Debug)]

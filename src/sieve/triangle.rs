@@ -2,14 +2,12 @@
 
 use glam::Vec3;
 
+use super::TINY;
 use super::vector::{cross, dot, sum_abs};
 use crate::block::leaf::TriangleBlock;
 use crate::math::rounding::UNIT32;
 use crate::ray::PreparedRay;
 use crate::simd::{Lanes, Scalar, Simd, Width};
-
-/// Far below every bound on coordinates in the frame, and far above what underflow can take away.
-const TINY: f32 = 1.0 / (1u128 << 100) as f32;
 
 /// The limits of one visit of a block, as depths of the sheared space.
 ///
