@@ -3,17 +3,17 @@
 use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID, KIND_LIST};
 use crate::bvh;
 use crate::error::OpenError;
-use crate::grid::{self, Cells};
+use crate::grid;
 use crate::prim::{self, Leaves};
 use crate::query::{
-    Any, Closest, Counts, Decide, Exact, Filter, Locate, Meets, Precision, PrimId, Query,
-    QueryOptions, Watch, Watertight, flat_number, geometry_of,
+    Counts, Decide, Exact, Filter, Meets, Precision, PrimId, QueryOptions, Watch, Watertight,
+    flat_number,
 };
-use crate::ray::{Hit, NONE, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
-use crate::simd::{self, Kernel, Scalar, Simd};
+use crate::ray::{Hit, PreparedRay, Ray};
 #[cfg(feature = "capi")]
 use crate::storage;
 use crate::surface::{self, Surface};
+use crate::trace;
 
 /// What a block holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -223,44 +223,27 @@ impl<'m> Accel<'m> {
         self.occluded_watched(ray, options, counts)
     }
 
+    #[inline(always)]
     fn intersect_watched(
         &self,
         ray: &Ray,
         options: &QueryOptions,
         watch: impl Watch,
     ) -> Option<Hit> {
-        let ray = self.prepare(ray)?;
+        let (block, filter) = (&self.0, self.filter(options));
         match options.precision {
-            Precision::Exact => self.closest::<Exact>(&ray, options, watch),
-            Precision::Watertight => self.closest::<Watertight>(&ray, options, watch),
+            Precision::Exact => trace::closest::<Exact, _>(block, ray, filter, watch),
+            Precision::Watertight => trace::closest::<Watertight, _>(block, ray, filter, watch),
         }
     }
 
+    #[inline(always)]
     fn occluded_watched(&self, ray: &Ray, options: &QueryOptions, watch: impl Watch) -> bool {
-        let Some(ray) = self.prepare(ray) else { return false };
-        let filter = self.filter(options);
+        let (block, filter) = (&self.0, self.filter(options));
         match options.precision {
-            Precision::Exact => self.ask(&ray, &mut Any::<Exact, _>::new(filter, &ray, watch)),
-            Precision::Watertight => {
-                self.ask(&ray, &mut Any::<Watertight, _>::new(filter, &ray, watch))
-            }
+            Precision::Exact => trace::any::<Exact, _>(block, ray, filter, watch),
+            Precision::Watertight => trace::any::<Watertight, _>(block, ray, filter, watch),
         }
-    }
-
-    fn prepare(&self, ray: &Ray) -> Option<PreparedRay> {
-        ray.prepare(self.0.header.reach)
-    }
-
-    fn closest<D: Decide>(
-        &self,
-        ray: &PreparedRay,
-        options: &QueryOptions,
-        watch: impl Watch,
-    ) -> Option<Hit> {
-        let mut query = Closest::<D, _>::new(self.filter(options), ray, watch);
-        self.ask(ray, &mut query);
-        let best = query.best?;
-        Some(self.hit::<D>(ray, &best, query.watch()))
     }
 
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when
@@ -269,7 +252,7 @@ impl<'m> Accel<'m> {
     /// The block keeps no way from a primitive's number to its place, so this follows the ray once
     /// more: it costs about as much as the intersect call did.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
-        let ray = self.prepare(ray)?;
+        let ray = ray.prepare(self.0.header.reach)?;
         let Hit { prim, geometry, instance, .. } = *hit;
         let id = PrimId { prim, geometry, instance };
         let number = flat_number(&id, self.0.geometries, self.0.header.prim_limit)?;
@@ -279,10 +262,8 @@ impl<'m> Accel<'m> {
 
     /// The surface at the hit with this flat number and `t` in one precision.
     fn surface_of<D: Decide>(&self, ray: &PreparedRay, number: u32, t: f32) -> Option<Surface> {
-        let mut query = Locate::<D>::new(number, t, ray);
-        self.ask(ray, &mut query);
-        let found = query.found?;
-        let (block, lane) = (found.place().0 as usize, found.place().1 as usize);
+        let found = trace::locate::<D>(&self.0, ray, number, t)?;
+        let (block, lane) = (found.place().block as usize, found.place().lane as usize);
         if number < self.0.header.triangle_limit {
             let corners = self.0.triangle_blocks.get(block)?.triangle(lane);
             return Some(surface::of_triangle(ray, corners));
@@ -291,79 +272,13 @@ impl<'m> Accel<'m> {
         Some(surface::of_sphere(ray, centre, radius, found.root()))
     }
 
-    /// Runs the one traversal of the structure at hand with the best instructions there are.
-    #[inline]
-    fn ask<Q: Query>(&self, ray: &PreparedRay, query: &mut Q) -> bool {
-        let ask = Ask { accel: self, ray, query };
-        if Q::PORTABLE { ask.run(Scalar) } else { simd::dispatch(ask) }
-    }
-
     fn leaves(&self) -> Leaves<'m> {
-        let Block { triangle_blocks, sphere_blocks, prim_ids, .. } = self.0;
-        Leaves { triangle_blocks, sphere_blocks, prim_ids }
+        Leaves::of(&self.0)
     }
-
-    fn filter(&self, options: &QueryOptions) -> Filter<'m> {
-        Filter::new(options, self.0.geometries, self.0.header.prim_limit)
-    }
-
-    /// The record of the meeting that won.
-    fn hit<D: Decide>(&self, ray: &PreparedRay, best: &D::Met, watch: &mut impl Watch) -> Hit {
-        let place = geometry_of(best.prim(), self.0.geometries);
-        let (geometry, first) = place.map_or((NONE, 0), |(number, g)| (number, g.first));
-        let [u, v] = D::weights(ray, best);
-        let t = D::t(ray, best, watch);
-        Hit { t, u, v, prim: best.prim() - first, geometry, instance: NONE }
-    }
-}
-
-/// One ray's question, waiting for a backend.
-struct Ask<'a, 'm, Q> {
-    accel: &'a Accel<'m>,
-    ray: &'a PreparedRay,
-    query: &'a mut Q,
-}
-
-impl<Q: Query> Kernel for Ask<'_, '_, Q> {
-    type Output = bool;
 
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> bool {
-        let Ask { accel: Accel(block), ray, query } = self;
-        let leaves = self.accel.leaves();
-        if let (KIND_GRID, Some(head)) = (block.header.kind, block.grids.first()) {
-            let Block { words, runs, .. } = *block;
-            return grid::walk(s, &Cells { head, words, runs, leaves }, ray, query);
-        }
-        // Boxes in `f32` where the frame allows.
-        match NarrowSlab::new(ray) {
-            Some(slab) => boxes(s, block, &leaves, ray, &slab, query),
-            None => wide_boxes(block, &leaves, ray, query),
-        }
-    }
-}
-
-/// For rays and scenes at the ends of the floats. They are so rare that portable code will do.
-#[cold]
-#[inline(never)]
-fn wide_boxes<Q: Query>(block: &Block, leaves: &Leaves, ray: &PreparedRay, query: &mut Q) -> bool {
-    boxes(Scalar, block, leaves, ray, &WideSlab::new(ray), query)
-}
-
-#[inline(always)]
-fn boxes<S: Simd, Q: Query>(
-    s: S,
-    block: &Block,
-    leaves: &Leaves,
-    ray: &PreparedRay,
-    slab: &impl Slab,
-    query: &mut Q,
-) -> bool {
-    match (block.header.kind, block.bundles) {
-        (KIND_BVH, Bundles::None) => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
-        (_, Bundles::Four(bundles)) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        (_, Bundles::Eight(bundles)) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        (_, Bundles::Sixteen(bundles)) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        (_, Bundles::None) => leaves.intersect_all(s, ray, slab, query),
+    fn filter(&self, options: &QueryOptions) -> Filter<'m> {
+        let Block { header, geometries, prim_ids, .. } = self.0;
+        Filter::new(options, geometries, header.prim_limit, prim_ids)
     }
 }

@@ -73,6 +73,7 @@ mod sieve;
 mod simd;
 mod storage;
 mod surface;
+mod trace;
 
 pub use accel::{Accel, Info, Kind, Layout};
 pub use build::{

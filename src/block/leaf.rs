@@ -50,6 +50,7 @@ impl TriangleBlock {
     };
 
     /// The vertices of triangle `i < 16`, whatever the block holds.
+    #[inline(always)]
     pub fn triangle(&self, i: usize) -> [[f32; 3]; 3] {
         let i = i % TRIANGLES;
         self.corners.map(|list| {
@@ -61,6 +62,7 @@ impl TriangleBlock {
     }
 
     /// The lanes in use, one bit each.
+    #[inline(always)]
     pub fn lanes(&self) -> u32 {
         low_bits(self.count.min(TRIANGLES as u32))
     }
@@ -74,6 +76,7 @@ impl TriangleBlock {
 }
 
 /// The byte of triangle `i < 16` in a list of corners, and the bits below its nibble.
+#[inline(always)]
 fn nibble(i: usize) -> (usize, usize) {
     let place = i % 2 * 8 + i / 2;
     (place / 2, 4 * (place % 2))
@@ -121,12 +124,14 @@ impl SphereBlock {
     }
 
     /// The lanes in use, one bit each.
+    #[inline(always)]
     pub fn lanes(&self) -> u32 {
         low_bits(self.count.min(SPHERES as u32))
     }
 }
 
 /// `n <= 16` ones.
+#[inline(always)]
 pub(crate) fn low_bits(n: u32) -> u32 {
     (1 << n.min(16)) - 1
 }
@@ -160,6 +165,24 @@ pub(crate) struct LeafRef {
     pub lanes: u32,
 }
 
+/// Where a primitive is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// The number of its leaf block among those of its kind.
+    pub block: u32,
+    pub lane: u32,
+    /// The number of its entry in `prim_ids`.
+    pub entry: u32,
+}
+
+impl Place {
+    /// The flat number of the primitive. Blocks are checked before they are traversed, so the entry exists.
+    #[inline(always)]
+    pub fn prim(self, prim_ids: &[u32]) -> u32 {
+        prim_ids.get(self.entry as usize).copied().unwrap_or(u32::MAX)
+    }
+}
+
 /// The kinds of leaf blocks.
 pub(crate) const KIND_TRIANGLES: u32 = 1;
 pub(crate) const KIND_SPHERES: u32 = 2;
@@ -172,10 +195,12 @@ pub(crate) const fn block_ref(kind: u32, number: u32) -> u32 {
 }
 
 impl LeafRef {
+    #[inline(always)]
     pub fn kind(self) -> u32 {
         self.block >> BLOCK_BITS
     }
 
+    #[inline(always)]
     pub fn number(self) -> usize {
         (self.block & ((1 << BLOCK_BITS) - 1)) as usize
     }

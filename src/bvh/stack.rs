@@ -6,7 +6,7 @@ use core::mem::MaybeUninit;
 
 use super::MAX_DEPTH;
 use crate::block::bundle::ChildRef;
-use crate::simd::{Lanes, Width};
+use crate::simd::{Lanes, Simd, Width};
 
 /// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry.
 const CAPACITY: usize = 15 * MAX_DEPTH + 2 * 16;
@@ -60,16 +60,22 @@ impl Stack {
         self.count = at + mask.count_ones() as usize;
     }
 
-    /// Takes the nearest of the last `count` children.
+    /// Pushes the children in the lanes of `mask`, of which there are some, and takes the nearest of
+    /// them, or nearly so.
     #[inline(always)]
-    pub fn pop_nearest(&mut self, count: usize) -> ChildRef {
-        let Some(first) = self.count.checked_sub(count) else { return ChildRef::NONE };
-        let last = self.count - 1;
-        let (mut nearest, mut least) = (last, self.t(last));
-        for i in first..last {
-            let t = self.t(i);
-            (nearest, least) = if t < least { (i, t) } else { (nearest, least) };
-        }
+    pub fn push_and_take_nearest<S: Width<W>, const W: usize>(
+        &mut self,
+        s: S,
+        mask: u32,
+        near: S::V,
+        refs: &[ChildRef; W],
+    ) -> ChildRef {
+        let first = self.count;
+        self.push(s, mask, near, refs);
+        let nearest = first + near.least_of(mask);
+        let Some(last) = self.count.checked_sub(1).filter(|last| nearest <= *last) else {
+            return ChildRef::NONE;
+        };
         let taken = self.reference(nearest);
         self.near[nearest] = self.near[last];
         self.refs[nearest] = self.refs[last];
@@ -79,29 +85,16 @@ impl Stack {
 
     /// Drops what the ray enters beyond `t_bound`.
     #[inline(always)]
-    pub fn cull(&mut self, t_bound: f32) {
-        let mut kept = 0;
-        for i in 0..self.count {
-            let t = self.t(i);
-            self.near[kept] = self.near[i];
-            self.refs[kept] = self.refs[i];
-            // Written so that a NaN is kept.
-            kept += usize::from(!(t > t_bound));
-        }
-        self.count = kept;
-    }
-
-    /// Entry `i`, below `count`.
-    #[inline(always)]
-    fn t(&self, i: usize) -> f32 {
-        debug_assert!(i < self.count);
+    pub fn cull<S: Simd>(&mut self, s: S, t_bound: f32) {
+        let (near, refs) = (&mut self.near[..self.count], &mut self.refs[..self.count]);
         // SAFETY: entries below `count` were written by `push`, or moved down from such ones.
-        unsafe { self.near[i].assume_init() }
+        self.count = unsafe { s.keep_up_to(near, refs, t_bound) };
     }
 
     /// Entry `i`, which is or was the last below `count`.
     #[inline(always)]
     fn reference(&self, i: usize) -> u32 {
+        debug_assert!(i <= self.count);
         // SAFETY: as above; taking an entry does not unwrite it.
         unsafe { self.refs[i].assume_init() }
     }

@@ -4,7 +4,7 @@ use super::stack::Stack;
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
-use crate::ray::{PreparedRay, Slab};
+use crate::ray::{PreparedRay, Slab, WideBoxes};
 use crate::simd::{Simd, Width};
 
 /// Offers `query` everything the ray meets, near bundles first; true when it ended the search.
@@ -21,29 +21,29 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
+    let boxes = slab.wide::<S, W>(s);
     let mut stack = Stack::new();
     let mut t_bound = query.t_bound();
+    let mut t_bounds = Width::<W>::splat(s, t_bound);
     let mut at = ChildRef::bundle(0);
     loop {
         while !at.is_leaf() {
             let Some(bundle) = bundles.get(at.bundle_number()) else { return false };
             query.watch().step();
             let (mask, near) = if Q::ANY_BOXES {
-                slab.lanes::<S, true, W>(s, &bundle.walls, t_bound)
+                boxes.entered::<true>(&bundle.walls, t_bounds)
             } else {
-                slab.lanes::<S, false, W>(s, &bundle.walls, t_bound)
+                boxes.entered::<false>(&bundle.walls, t_bounds)
             };
             if mask & mask.wrapping_sub(1) == 0 {
                 let only = bundle.refs.get(mask.trailing_zeros() as usize);
                 at = only.copied().unwrap_or_else(|| stack.pop());
-                continue;
-            }
-            stack.push(s, mask, near, &bundle.refs);
-            at = if Q::ORDERED {
-                stack.pop_nearest(mask.count_ones() as usize)
+            } else if Q::ORDERED {
+                at = stack.push_and_take_nearest(s, mask, near, &bundle.refs);
             } else {
-                stack.pop()
-            };
+                stack.push(s, mask, near, &bundle.refs);
+                at = stack.pop();
+            }
         }
         if at == ChildRef::NONE {
             return false;
@@ -53,7 +53,8 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
         }
         if query.t_bound() < t_bound {
             t_bound = query.t_bound();
-            stack.cull(t_bound);
+            t_bounds = Width::<W>::splat(s, t_bound);
+            stack.cull(s, t_bound);
         }
         at = stack.pop();
     }

@@ -65,6 +65,7 @@ impl Feature {
 /// computed again without error.
 ///
 /// Source: \[DEG12\]; the filter after \[She97\].
+#[inline(never)]
 pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let [u, v, w] = volumes(line, triangle);
     let (least, most) = (u.min(v).min(w), u.max(v).max(w));
@@ -124,6 +125,7 @@ pub(crate) fn weights(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 2] {
 
 /// The meeting of the line with the triangle's plane: all that is left to ask for a line that surely
 /// passes between the edges. `None` when it is parallel.
+#[inline(always)]
 pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let [a, b, c] = triangle.map(wide);
     let d = wide(line.direction);
@@ -134,19 +136,21 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
     // Four roundings in `n`, one in `to_plane`, three in either dot product.
     let size = gamma(8) * sum_abs(e1) * sum_abs(e2);
     let along_error = sum_abs(d) * size;
-    let t = to_plane.dot(n) / along;
-    if 1024.0 * along_error < along.abs() {
-        let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
-        // A hundredth for the divisor's own error, and the rounding of the quotient.
-        let t_error = 1.01 * t_error + 2.0 * UNIT * t.abs();
-        return Some(TriangleMeeting {
-            t,
-            t_error,
-            front: along < 0.0,
-            exact: false,
-            feature: Feature::Face,
-        });
+    if !(1024.0 * along_error < along.abs()) {
+        return exact_plane(line, triangle);
     }
+    let inverse = 1.0 / along;
+    let t = to_plane.dot(n) * inverse;
+    let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) * inverse.abs();
+    // A hundredth for the divisor's own error, and the roundings of inverse and quotient.
+    let t_error = 1.01 * t_error + 3.0 * UNIT * t.abs();
+    Some(TriangleMeeting { t, t_error, front: along < 0.0, exact: false, feature: Feature::Face })
+}
+
+/// The same where the plane is nearly parallel to the line, without error.
+#[cold]
+#[inline(never)]
+fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
     let (t, t_error) = distance.approximate();
     // None of the volumes is of the other sign.

@@ -19,11 +19,13 @@ pub(crate) fn sqrt32(x: f32) -> f32 {
 }
 
 /// `2^n`, for `-149 <= n <= 127`: below -126 it is subnormal.
+#[inline(always)]
 pub(crate) const fn narrow_power_of_two(n: i32) -> f32 {
     if n < -126 { f32::from_bits(1 << (n + 149)) } else { f32::from_bits(((n + 127) as u32) << 23) }
 }
 
 /// `2^n`; for what is not a normal float, the nearest power that is.
+#[inline(always)]
 pub(crate) fn power_of_two(n: i32) -> f64 {
     f64::from_bits(((n.clamp(-1022, 1023) + 1023) as u64) << 52)
 }

@@ -16,12 +16,14 @@ pub(crate) const fn gamma(n: u32) -> f64 {
 }
 
 /// The largest `f32` that is not above `x`; NaN stays NaN.
+#[inline]
 pub(crate) fn f32_below(x: f64) -> f32 {
     let rounded = x as f32;
     if f64::from(rounded) > x { rounded.next_down() } else { rounded }
 }
 
 /// The smallest `f32` that is not below `x`; NaN stays NaN.
+#[inline]
 pub(crate) fn f32_above(x: f64) -> f32 {
     let rounded = x as f32;
     if f64::from(rounded) < x { rounded.next_up() } else { rounded }

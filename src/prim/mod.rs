@@ -8,10 +8,13 @@ pub(crate) use gather::{Shape, Survey, for_each_prim, geometries, shape, survey}
 pub(crate) use pack::Packer;
 pub(crate) use validate::leaves_are_sound;
 
-use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SphereBlock, TriangleBlock};
+use crate::block::Block;
+use crate::block::leaf::{
+    KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock,
+};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
-use crate::sieve::{self, Depths};
+use crate::sieve;
 use crate::simd::Simd;
 
 /// The leaf blocks of one accel.
@@ -20,6 +23,15 @@ pub(crate) struct Leaves<'m> {
     pub triangle_blocks: &'m [TriangleBlock],
     pub sphere_blocks: &'m [SphereBlock],
     pub prim_ids: &'m [u32],
+}
+
+impl<'m> Leaves<'m> {
+    /// Those of a block.
+    #[inline(always)]
+    pub fn of(block: &Block<'m>) -> Self {
+        let Block { triangle_blocks, sphere_blocks, prim_ids, .. } = *block;
+        Leaves { triangle_blocks, sphere_blocks, prim_ids }
+    }
 }
 
 impl Leaves<'_> {
@@ -110,24 +122,30 @@ impl Leaves<'_> {
     ) -> bool {
         query.watch().block(lanes.count_ones());
         let t_bound = query.t_bound();
-        let found = sieve::triangles(s, ray, &Depths::new(ray, t_bound), block, lanes);
+        let found = if Q::ANY_BOXES {
+            sieve::triangles::<S, true>(s, ray, t_bound, block, lanes)
+        } else {
+            sieve::triangles::<S, false>(s, ray, t_bound, block, lanes)
+        };
+        if found.candidates == 0 {
+            return false;
+        }
         // Many in doubt: the block is small for the precision of the sieve, and of the boxes above it.
-        let in_doubt = (found.candidates & lanes & !found.sure).count_ones();
+        let in_doubt = (found.candidates & !found.sure).count_ones();
         if Q::ANY_BOXES && in_doubt > 2 && !is_near(ray, block, t_bound) {
             return false;
         }
-        for lane in Lanes(found.candidates & lanes) {
+        for lane in Lanes(found.candidates) {
             let corners = block.triangle(lane);
             // What was found in a lane before may already be nearer.
             let bound = query.t_bound();
-            if bound < t_bound && !sieve::is_candidate(ray, &Depths::new(ray, bound), corners) {
+            if bound < t_bound && !sieve::is_candidate(ray, bound, corners) {
                 continue;
             }
             let has = |mask: u32| mask >> lane & 1 == 1;
             let lane = TriangleLane {
                 corners,
-                prim: self.prim_id(block.first, lane),
-                place: (number as u32, lane as u32),
+                place: place(number, block.first, lane),
                 sure: has(found.sure),
                 inside: has(found.inside),
             };
@@ -151,18 +169,17 @@ impl Leaves<'_> {
         Lanes(lanes).any(|lane| {
             let (centre, radius) = block.sphere(lane);
             sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
-                let prim = self.prim_id(block.first, lane);
-                let place = (number as u32, lane as u32);
-                query.sphere(ray, &SphereLane { centre, radius, prim, place, detail })
+                let place = place(number, block.first, lane);
+                query.sphere(ray, &SphereLane { centre, radius, place, detail })
             })
         })
     }
+}
 
-    /// The flat number of the primitive in a lane. Blocks are checked before they are traversed,
-    /// so the entry exists.
-    fn prim_id(&self, first: u32, lane: usize) -> u32 {
-        self.prim_ids.get(first as usize + lane).copied().unwrap_or(crate::ray::NONE)
-    }
+/// The place of a lane of the block with this number and first entry.
+#[inline(always)]
+fn place(number: usize, first: u32, lane: usize) -> Place {
+    Place { block: number as u32, lane: lane as u32, entry: first.wrapping_add(lane as u32) }
 }
 
 /// Whether the ray comes near a block, in `f64`.
@@ -177,6 +194,7 @@ struct Lanes(u32);
 impl Iterator for Lanes {
     type Item = usize;
 
+    #[inline(always)]
     fn next(&mut self) -> Option<usize> {
         let lane = self.0.trailing_zeros();
         self.0 &= self.0.wrapping_sub(1);

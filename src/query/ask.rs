@@ -9,22 +9,25 @@ pub(crate) struct Closest<'m, D: Decide, W> {
     t_bound: f32,
     pub best: Option<D::Met>,
     memory: D::Memory,
-    watch: W,
+    pub watch: W,
 }
 
 impl<'m, D: Decide, W: Watch> Closest<'m, D, W> {
+    #[inline(always)]
     pub fn new(filter: Filter<'m>, ray: &PreparedRay, watch: W) -> Self {
         Closest { filter, t_bound: ray.t_max, best: None, memory: D::Memory::default(), watch }
     }
 
+    #[inline(always)]
     fn consider(&mut self, ray: &PreparedRay, met: &D::Met) {
         if !self.filter.faces(met.front()) {
             return;
         }
         if let Some(best) = &self.best {
             // The grid offers a primitive once for each cell that holds it.
-            let known = met.prim() == best.prim() && met.root() == best.root();
-            if known || !D::is_before(ray, met, best, &mut self.memory, &mut self.watch) {
+            let known = met.place() == best.place() && met.root() == best.root();
+            let (prim_ids, memory) = (self.filter.prim_ids, &mut self.memory);
+            if known || !D::is_before(ray, met, best, prim_ids, memory, &mut self.watch) {
                 return;
             }
         }
@@ -37,17 +40,23 @@ impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
     type Watch = W;
     const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = true;
-    const PORTABLE: bool = W::COUNTS;
 
+    #[inline(always)]
     fn t_bound(&self) -> f32 {
         self.t_bound
     }
 
+    #[inline(always)]
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
         // What was offered once is not computed again.
-        let known = |best: &D::Met| best.prim() == lane.prim || D::is_surely_after(lane, best);
-        if !self.best.as_ref().is_some_and(known)
-            && self.filter.sees(lane.prim, true)
+        let known = match &self.best {
+            Some(best) => {
+                best.place() == lane.place || D::is_surely_after(lane, best, self.filter.prim_ids)
+            }
+            None => false,
+        };
+        if !known
+            && self.filter.sees(lane.place, true)
             && let Some(met) = D::triangle(ray, lane, &mut self.watch)
         {
             self.consider(ray, &met);
@@ -56,9 +65,9 @@ impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
     }
 
     fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
-        if self.filter.sees(lane.prim, false) {
+        if self.filter.sees(lane.place, false) {
             for met in D::sphere(ray, lane, &mut self.watch).iter().flatten() {
-                if self.filter.sees(lane.prim, met.skippable()) {
+                if self.filter.sees(lane.place, met.skippable()) {
                     self.consider(ray, met);
                 }
             }
@@ -66,6 +75,7 @@ impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
         false
     }
 
+    #[inline(always)]
     fn watch(&mut self) -> &mut W {
         &mut self.watch
     }
@@ -80,6 +90,7 @@ pub(crate) struct Any<'m, D, W> {
 }
 
 impl<'m, D: Decide, W: Watch> Any<'m, D, W> {
+    #[inline(always)]
     pub fn new(filter: Filter<'m>, ray: &PreparedRay, watch: W) -> Self {
         Any { filter, t_max: ray.t_max, watch, decide: core::marker::PhantomData }
     }
@@ -89,14 +100,15 @@ impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
     type Watch = W;
     const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = false;
-    const PORTABLE: bool = W::COUNTS;
 
+    #[inline(always)]
     fn t_bound(&self) -> f32 {
         self.t_max
     }
 
+    #[inline(always)]
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
-        if !self.filter.sees(lane.prim, true) {
+        if !self.filter.sees(lane.place, true) {
             return false;
         }
         // Neither `t` nor side is needed of what is surely hit.
@@ -107,60 +119,65 @@ impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
     }
 
     fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
-        self.filter.sees(lane.prim, false)
+        self.filter.sees(lane.place, false)
             && D::sphere(ray, lane, &mut self.watch).iter().flatten().any(|met| {
-                self.filter.sees(lane.prim, met.skippable()) && self.filter.faces(met.front())
+                self.filter.sees(lane.place, met.skippable()) && self.filter.faces(met.front())
             })
     }
 
+    #[inline(always)]
     fn watch(&mut self) -> &mut W {
         &mut self.watch
     }
 }
 
 /// Finds the hit with this primitive and this answered `t` again.
-pub(crate) struct Locate<D: Decide> {
+pub(crate) struct Locate<'m, D: Decide> {
     prim: u32,
+    prim_ids: &'m [u32],
     t: f32,
     t_max: f32,
     pub found: Option<D::Met>,
     watch: (),
 }
 
-impl<D: Decide> Locate<D> {
-    pub fn new(prim: u32, t: f32, ray: &PreparedRay) -> Self {
-        Locate { prim, t, t_max: ray.t_max, found: None, watch: () }
+impl<'m, D: Decide> Locate<'m, D> {
+    #[inline(always)]
+    pub fn new(prim: u32, t: f32, ray: &PreparedRay, prim_ids: &'m [u32]) -> Self {
+        Locate { prim, prim_ids, t, t_max: ray.t_max, found: None, watch: () }
     }
 
+    #[inline(always)]
     fn consider(&mut self, ray: &PreparedRay, met: Option<D::Met>) -> bool {
         self.found = met.filter(|met| D::t(ray, met, &mut ()) == self.t);
         self.found.is_some()
     }
 }
 
-impl<D: Decide> Query for Locate<D> {
+impl<D: Decide> Query for Locate<'_, D> {
     type Watch = ();
     const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = true;
-    // Hits of the watertight mode, which is tried second, are rarely looked up.
-    const PORTABLE: bool = !D::ANY_BOXES;
 
+    #[inline(always)]
     fn t_bound(&self) -> f32 {
         self.t_max
     }
 
+    #[inline(always)]
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
-        lane.prim == self.prim && {
+        lane.place.prim(self.prim_ids) == self.prim && {
             let met = D::triangle(ray, lane, &mut ());
             self.consider(ray, met)
         }
     }
 
     fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
-        lane.prim == self.prim
+        lane.place.prim(self.prim_ids) == self.prim
             && D::sphere(ray, lane, &mut ()).into_iter().any(|met| self.consider(ray, met))
     }
 
+    #[inline(always)]
     fn watch(&mut self) -> &mut () {
         &mut self.watch
     }

@@ -3,6 +3,7 @@
 use core::cmp::Ordering;
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
+use crate::block::leaf::Place;
 use crate::exact::{Distance, Meeting};
 use crate::interval::triangle::Feature;
 use crate::interval::{sphere, triangle};
@@ -21,18 +22,13 @@ pub(crate) struct ExactMet {
     meeting: Meeting,
     /// Where on a triangle.
     feature: Feature,
-    prim: u32,
-    place: (u32, u32),
+    place: Place,
     front: bool,
     skippable: bool,
 }
 
 impl Meets for ExactMet {
-    fn prim(&self) -> u32 {
-        self.prim
-    }
-
-    fn place(&self) -> (u32, u32) {
+    fn place(&self) -> Place {
         self.place
     }
 
@@ -57,12 +53,14 @@ impl ExactMet {
     ///
     /// `t_error` grants at least one rounding of `t` more than the error needs, which covers the
     /// rounding of these two sums; a hundredth of it covers its own arithmetic.
+    #[inline(always)]
     fn interval(&self) -> Interval<f64> {
         let margin = 1.01 * self.t_error;
         Interval { near: self.t - margin, far: self.t + margin }
     }
 
     /// The meeting, if its real `t` is within the ray's limits.
+    #[inline(always)]
     fn limited(self, ray: &PreparedRay, watch: &mut impl Watch) -> Option<Self> {
         let (t_min, t_max) = (ray.given.t_min, ray.given.t_max);
         let inside = match within(self.interval(), f64::from(t_min), f64::from(t_max)) {
@@ -70,13 +68,54 @@ impl ExactMet {
             Within::All => true,
             Within::Part => {
                 watch.exact();
-                Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
-                    t.compare_with(t_min) != Ordering::Less
-                        && t.compare_with(t_max) != Ordering::Greater
-                })
+                self.is_within(ray)
             }
         };
         inside.then_some(self)
+    }
+
+    /// Whether the real `t` is within the ray's limits, in real arithmetic.
+    #[cold]
+    #[inline(never)]
+    fn is_within(&self, ray: &PreparedRay) -> bool {
+        Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
+            t.compare_with(ray.given.t_min) != Ordering::Less
+                && t.compare_with(ray.given.t_max) != Ordering::Greater
+        })
+    }
+
+    /// Whether this comes before `best`, whose interval overlaps with this one's.
+    #[cold]
+    #[inline(never)]
+    fn is_really_before(
+        &self,
+        ray: &PreparedRay,
+        best: &ExactMet,
+        prim_ids: &[u32],
+        memory: &mut ExactMemory,
+        watch: &mut impl Watch,
+    ) -> bool {
+        let first = self.place.prim(prim_ids) < best.place.prim(prim_ids);
+        // Neighbours that share what the ray passes through, and doubled surfaces.
+        if self.feature.is_same(&best.feature) || self.meeting.surely_equal(&best.meeting) {
+            return first;
+        }
+        watch.exact();
+        let mine = Distance::new(&ray.line(), &self.meeting);
+        match mine.zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best)) {
+            Some(Ordering::Less) => true,
+            Some(Ordering::Greater) => false,
+            Some(Ordering::Equal) => first,
+            // Neither number exists: only blocks of foreign bytes come here.
+            None => self.t < best.t,
+        }
+    }
+
+    /// The nearest float to the real `t`, in real arithmetic.
+    #[cold]
+    #[inline(never)]
+    fn rounded(&self, ray: &PreparedRay) -> f32 {
+        Distance::new(&ray.line(), &self.meeting).map_or(self.t as f32, |t| t.round())
     }
 }
 
@@ -84,13 +123,13 @@ impl ExactMet {
 #[derive(Default)]
 pub(crate) struct ExactMemory {
     /// Whose it is.
-    of: Option<(u32, usize)>,
+    of: Option<(Place, usize)>,
     t: Option<Distance>,
 }
 
 impl ExactMemory {
     fn t_of(&mut self, ray: &PreparedRay, met: &ExactMet) -> Option<&Distance> {
-        let key = (met.prim, met.root());
+        let key = (met.place, met.root());
         if self.of != Some(key) {
             *self = ExactMemory { of: Some(key), t: Distance::new(&ray.line(), &met.meeting) };
         }
@@ -103,6 +142,7 @@ impl Decide for Exact {
     const ANY_BOXES: bool = true;
     type Memory = ExactMemory;
 
+    #[inline(always)]
     fn triangle(
         ray: &PreparedRay,
         lane: &TriangleLane,
@@ -123,7 +163,6 @@ impl Decide for Exact {
             t_error: meeting.t_error,
             meeting: Meeting::Triangle(lane.corners),
             feature: meeting.feature,
-            prim: lane.prim,
             place: lane.place,
             front: meeting.front,
             skippable: true,
@@ -131,6 +170,7 @@ impl Decide for Exact {
         met.limited(ray, watch)
     }
 
+    #[inline(never)]
     fn sphere(
         ray: &PreparedRay,
         lane: &SphereLane,
@@ -148,7 +188,6 @@ impl Decide for Exact {
                 t_error: both.t_error[root],
                 meeting: Meeting::Sphere { centre, radius, root },
                 feature: Feature::Face,
-                prim: lane.prim,
                 place: lane.place,
                 front: root == 0,
                 // A line that only touches meets front and back in one point.
@@ -158,10 +197,12 @@ impl Decide for Exact {
         })
     }
 
+    #[inline(always)]
     fn is_before(
         ray: &PreparedRay,
         met: &ExactMet,
         best: &ExactMet,
+        prim_ids: &[u32],
         memory: &mut ExactMemory,
         watch: &mut impl Watch,
     ) -> bool {
@@ -172,33 +213,25 @@ impl Decide for Exact {
         if b.far < a.near {
             return false;
         }
-        let first = met.prim < best.prim;
-        // Neighbours that share what the ray passes through, and doubled surfaces.
-        if met.feature.is_same(&best.feature) || met.meeting.surely_equal(&best.meeting) {
-            return first;
-        }
-        watch.exact();
-        let mine = Distance::new(&ray.line(), &met.meeting);
-        match mine.zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best)) {
-            Some(Ordering::Less) => true,
-            Some(Ordering::Greater) => false,
-            Some(Ordering::Equal) => first,
-            // Neither number exists: only blocks of foreign bytes come here.
-            None => met.t < best.t,
-        }
+        met.is_really_before(ray, best, prim_ids, memory, watch)
     }
 
-    fn is_surely_after(lane: &TriangleLane, best: &ExactMet) -> bool {
-        // Cheaper than finding out whether it is met: neighbours at a vertex, and doubled surfaces.
-        best.prim < lane.prim
+    #[inline(always)]
+    fn is_surely_after(lane: &TriangleLane, best: &ExactMet, prim_ids: &[u32]) -> bool {
+        // Cheaper than finding out whether it is met, if that is not clear already: neighbours at a vertex,
+        // and doubled surfaces.
+        !lane.sure
+            && best.place.prim(prim_ids) < lane.place.prim(prim_ids)
             && (best.feature.is_part_of(&lane.corners)
                 || best.meeting.surely_equal(&Meeting::Triangle(lane.corners)))
     }
 
+    #[inline(always)]
     fn t_bound(ray: &PreparedRay, met: &ExactMet) -> f32 {
         ray.t_above(met.interval().far)
     }
 
+    #[inline(always)]
     fn t(ray: &PreparedRay, met: &ExactMet, watch: &mut impl Watch) -> f32 {
         let nearest = met.t as f32;
         let Interval { near, far } = met.interval();
@@ -206,12 +239,13 @@ impl Decide for Exact {
             nearest
         } else {
             watch.rounding();
-            Distance::new(&ray.line(), &met.meeting).map_or(nearest, |t| t.round())
+            met.rounded(ray)
         };
         // Adding +0 turns -0 into +0.
         rounded + 0.0
     }
 
+    #[inline(always)]
     fn weights(ray: &PreparedRay, met: &ExactMet) -> [f32; 2] {
         match met.meeting {
             Meeting::Triangle(corners) => {
@@ -223,6 +257,7 @@ impl Decide for Exact {
 }
 
 /// Whether all of an interval lies within the limits, or only a part of it, or none.
+#[inline(always)]
 fn within(part: Interval<f64>, t_min: f64, t_max: f64) -> Within {
     if part.far < t_min || part.near > t_max {
         Within::None

@@ -15,6 +15,7 @@ pub use options::{Facing, Precision, PrimId, QueryOptions};
 pub(crate) use options::{Filter, flat_number, geometry_of};
 pub(crate) use watertight::Watertight;
 
+use crate::block::leaf::Place;
 use crate::ray::PreparedRay;
 use crate::sieve::SphereDetail;
 
@@ -83,10 +84,8 @@ impl Watch for &mut Counts {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TriangleLane {
     pub corners: [[f32; 3]; 3],
-    /// The flat number of the primitive.
-    pub prim: u32,
-    /// Where it is stored: the number of its leaf block and its lane.
-    pub place: (u32, u32),
+    /// Where it is stored. Its number is farther away, and looked up only where it matters.
+    pub place: Place,
     /// The ray's line passes between the edges: this is no longer in doubt.
     pub sure: bool,
     /// And the real `t` is within the ray's limits.
@@ -98,8 +97,7 @@ pub(crate) struct TriangleLane {
 pub(crate) struct SphereLane {
     pub centre: [f32; 3],
     pub radius: f32,
-    pub prim: u32,
-    pub place: (u32, u32),
+    pub place: Place,
     pub detail: SphereDetail,
 }
 
@@ -114,9 +112,6 @@ pub(crate) trait Query {
 
     /// Whether near nodes had better come first.
     const ORDERED: bool;
-
-    /// Whether portable code is fast enough for this question, which saves its code for every backend.
-    const PORTABLE: bool;
 
     /// Nothing beyond this `t` of the frame is of interest any more.
     fn t_bound(&self) -> f32;
@@ -160,12 +155,13 @@ pub(crate) trait Decide {
         ray: &PreparedRay,
         met: &Self::Met,
         best: &Self::Met,
+        prim_ids: &[u32],
         memory: &mut Self::Memory,
         watch: &mut impl Watch,
     ) -> bool;
 
     /// Whether a triangle, if it is met at all, surely comes after `best`.
-    fn is_surely_after(lane: &TriangleLane, best: &Self::Met) -> bool;
+    fn is_surely_after(lane: &TriangleLane, best: &Self::Met, prim_ids: &[u32]) -> bool;
 
     /// A `t` of the frame that is not below the real one of `met`, or whatever stands for it.
     fn t_bound(ray: &PreparedRay, met: &Self::Met) -> f32;
@@ -179,8 +175,7 @@ pub(crate) trait Decide {
 
 /// What every meeting knows of itself.
 pub(crate) trait Meets {
-    fn prim(&self) -> u32;
-    fn place(&self) -> (u32, u32);
+    fn place(&self) -> Place;
     /// Whether the ray meets the front; `None` when this cannot tell.
     fn front(&self) -> Option<bool>;
     /// Which of the meetings with one primitive it is.

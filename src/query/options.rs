@@ -1,6 +1,7 @@
 //! What one query may leave out, and how right it must be.
 
 use crate::block::Geometry;
+use crate::block::leaf::Place;
 use crate::ray::NONE;
 
 /// Which of two sides of a surface a ray may meet.
@@ -71,6 +72,7 @@ pub struct QueryOptions {
 #[derive(Clone, Copy)]
 pub(crate) struct Filter<'m> {
     geometries: &'m [Geometry],
+    pub prim_ids: &'m [u32],
     mask: u32,
     facing: Facing,
     skip: u32,
@@ -78,23 +80,39 @@ pub(crate) struct Filter<'m> {
 
 impl<'m> Filter<'m> {
     /// The filter of `options` over a scene with these geometries.
-    pub fn new(options: &QueryOptions, geometries: &'m [Geometry], prim_limit: u32) -> Self {
+    #[inline(always)]
+    pub fn new(
+        options: &QueryOptions,
+        geometries: &'m [Geometry],
+        prim_limit: u32,
+        prim_ids: &'m [u32],
+    ) -> Self {
         let skip = options.skip.and_then(|id| flat_number(&id, geometries, prim_limit));
         let QueryOptions { mask, facing, .. } = *options;
-        Filter { geometries, mask, facing, skip: skip.unwrap_or(NONE) }
+        Filter { geometries, prim_ids, mask, facing, skip: skip.unwrap_or(NONE) }
     }
 
-    /// Whether a meeting with this primitive counts; only those that are `skippable` are skipped.
-    pub fn sees(&self, prim: u32, skippable: bool) -> bool {
+    /// Whether a meeting with the primitive stored there counts; only those that are `skippable` are
+    /// skipped.
+    #[inline(always)]
+    pub fn sees(&self, place: Place, skippable: bool) -> bool {
+        let sees_all = self.mask == 0 && (self.skip == NONE || !skippable);
+        sees_all || self.sees_prim(place.prim(self.prim_ids), skippable)
+    }
+
+    #[inline(never)]
+    fn sees_prim(&self, prim: u32, skippable: bool) -> bool {
         !(skippable && prim == self.skip) && (self.mask == 0 || self.mask_sees(prim))
     }
 
     /// Whether meetings with either side count.
+    #[inline(always)]
     pub fn both_sides(&self) -> bool {
         self.facing == Facing::Both
     }
 
     /// Whether a meeting with this side counts; an unknown one does.
+    #[inline(always)]
     pub fn faces(&self, front: Option<bool>) -> bool {
         match self.facing {
             Facing::Both => true,
@@ -110,6 +128,7 @@ impl<'m> Filter<'m> {
 }
 
 /// The number of the geometry that holds the flat number `prim`, and the geometry.
+#[inline]
 pub(crate) fn geometry_of(prim: u32, geometries: &[Geometry]) -> Option<(u32, &Geometry)> {
     // Empty geometries share their first number with the next one; the last of them holds it.
     let after = geometries.partition_point(|g| g.first <= prim);

@@ -1,6 +1,7 @@
 //! Decisions in `f32` alone.
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
+use crate::block::leaf::Place;
 use crate::ray::PreparedRay;
 use crate::sieve;
 
@@ -13,19 +14,14 @@ pub(crate) struct Watertight;
 pub(crate) struct WatertightMet {
     t: f32,
     weights: [f32; 2],
-    prim: u32,
-    place: (u32, u32),
+    place: Place,
     front: Option<bool>,
     root: usize,
     skippable: bool,
 }
 
 impl Meets for WatertightMet {
-    fn prim(&self) -> u32 {
-        self.prim
-    }
-
-    fn place(&self) -> (u32, u32) {
+    fn place(&self) -> Place {
         self.place
     }
 
@@ -59,7 +55,6 @@ impl Decide for Watertight {
         Some(WatertightMet {
             t: limited(ray, detail.t),
             weights: detail.weights,
-            prim: lane.prim,
             place: lane.place,
             front: detail.front,
             root: 0,
@@ -82,7 +77,6 @@ impl Decide for Watertight {
             Some(WatertightMet {
                 t: limited(ray, t),
                 weights: [0.0; 2],
-                prim: lane.prim,
                 place: lane.place,
                 front: Some(root == 0),
                 root,
@@ -96,13 +90,14 @@ impl Decide for Watertight {
         _: &PreparedRay,
         met: &WatertightMet,
         best: &WatertightMet,
+        prim_ids: &[u32],
         (): &mut (),
         _: &mut impl Watch,
     ) -> bool {
-        met.t < best.t || (met.t == best.t && met.prim < best.prim)
+        met.t < best.t || (met.t == best.t && met.place.prim(prim_ids) < best.place.prim(prim_ids))
     }
 
-    fn is_surely_after(_: &TriangleLane, _: &WatertightMet) -> bool {
+    fn is_surely_after(_: &TriangleLane, _: &WatertightMet, _: &[u32]) -> bool {
         false
     }
 

@@ -51,72 +51,84 @@ pub(crate) struct Shear {
     pub depth_rate: f32,
 }
 
-/// The exponent `e` with `|x| < 2^e`, at least -126; 129 for infinity.
-fn exponent_above(x: f32) -> i32 {
-    (x.to_bits() >> 23 & 0xff) as i32 - 126
+/// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
+/// infinities and NaN above the others.
+#[inline(always)]
+fn largest_bits(v: [f32; 3]) -> u32 {
+    let [x, y, z] = v.map(|x| x.to_bits() & !(1 << 31));
+    x.max(y).max(z)
 }
 
-/// `x * 2^n` for `|n| <= 252`, rounded at most where it becomes subnormal.
-fn scaled(x: f32, n: i32) -> f32 {
-    let half = n / 2;
-    x * narrow_power_of_two(half) * narrow_power_of_two(n - half)
+/// The exponent `e` with `|x| < 2^e` by the bits of `|x|`, at least -126; 129 for infinity.
+#[inline(always)]
+fn exponent_above(bits: u32) -> i32 {
+    (bits >> 23) as i32 - 126
 }
 
-fn largest(v: [f32; 3]) -> f32 {
-    v[0].abs().max(v[1].abs()).max(v[2].abs())
+/// The floats around `x`: not above it, and not below. Mostly both are `x`.
+#[inline(always)]
+fn floats_around(x: f64) -> [f32; 2] {
+    let rounded = x as f32;
+    if f64::from(rounded) == x { [rounded; 2] } else { [f32_below(x), f32_above(x)] }
 }
+
+const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
 
 impl Ray {
     /// What traversal needs, or `None` for a ray that hits nothing by definition. `reach` is the
     /// largest coordinate of the scene, infinite if it is not representable.
+    #[inline(always)]
     pub(crate) fn prepare(&self, reach: f32) -> Option<PreparedRay> {
-        let finite = |v: [f32; 3]| v.iter().all(|x| x.is_finite());
-        let longest = largest(self.direction);
-        let t_min = self.t_min.max(-f32::MAX);
-        let t_max = self.t_max.min(f32::MAX);
-        // `max` and `min` drop a NaN, so it is looked for in the limits as given.
-        let limits = self.t_min <= self.t_max && t_min <= t_max;
-        if !(finite(self.origin) && finite(self.direction) && longest > 0.0 && limits) {
+        let (farthest, longest) = (largest_bits(self.origin), largest_bits(self.direction));
+        let t_min = if self.t_min < -f32::MAX { -f32::MAX } else { self.t_min };
+        let t_max = if self.t_max > f32::MAX { f32::MAX } else { self.t_max };
+        let finite = farthest < INFINITY_BITS && longest < INFINITY_BITS;
+        if !(finite && longest > 0 && t_min <= t_max) {
             return None;
         }
-        let reach = largest(self.origin).max(reach);
+        let reach = farthest.max(reach.to_bits());
         let exponent = exponent_above(reach).clamp(-126, 126);
         let scale = narrow_power_of_two(-exponent);
-        // Subnormal components have no exponent of their own: two steps bring them up.
-        let lift = if longest < f32::MIN_POSITIVE { 24 } else { 0 };
-        let length = exponent_above(scaled(longest, lift)) - 1 - lift;
-        let direction = self.direction.map(|x| scaled(x, -length));
-        let t_exponent = length - exponent;
-        let t_scale = power_of_two(t_exponent);
-        let in_frame = |t: f32| f64::from(t) * t_scale;
+        // Subnormal components have no exponent of their own: a first step brings them up.
+        let lift = if longest < f32::MIN_POSITIVE.to_bits() { 24 } else { 0 };
+        let lifted = |x: f32| if lift == 0 { x } else { x * narrow_power_of_two(lift) };
+        let length = exponent_above(lifted(f32::from_bits(longest)).to_bits()) - 1;
+        let shorten = narrow_power_of_two(-length);
+        let direction = self.direction.map(|x| lifted(x) * shorten);
+        let t_scale = power_of_two(length - lift - exponent);
+        let [t_min_below, t_min_above] = floats_around(f64::from(t_min) * t_scale);
+        let [t_max_below, t_max_above] = floats_around(f64::from(t_max) * t_scale);
+        let reach = f32::from_bits(reach) * scale;
         Some(PreparedRay {
             given: Ray { t_min, t_max, ..*self },
             scale,
             exponent,
             origin: self.origin.map(|x| x * scale),
             direction,
-            reach: (reach * scale).min(4.0),
+            reach: if reach > 4.0 { 4.0 } else { reach },
             t_scale,
-            t_min: f32_below(in_frame(t_min)),
-            t_max: f32_above(in_frame(t_max)),
-            t_inside: [f32_above(in_frame(t_min)), f32_below(in_frame(t_max))],
+            t_min: t_min_below,
+            t_max: t_max_above,
+            t_inside: [t_min_above, t_max_below],
             shear: Shear::new(direction),
         })
     }
 }
 
 impl Shear {
+    #[inline(always)]
     fn new(direction: [f32; 3]) -> Self {
         let [x, y, z] = direction.map(f32::abs);
         let depth = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
-        let axes = [(depth + 1) % 3, (depth + 2) % 3, depth];
+        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][depth];
         let depth_rate = direction[depth].abs();
         let inverse = 1.0 / depth_rate;
         let slope = [axes[0], axes[1]].map(|axis| direction[axis] * inverse);
+        let [a, b] = slope.map(f32::abs);
         Shear {
             axes,
             slope,
-            steepness: slope[0].abs().max(slope[1].abs()),
+            steepness: if a > b { a } else { b },
             depth_sign: 1f32.copysign(direction[depth]),
             depth_rate,
         }
@@ -131,6 +143,7 @@ impl PreparedRay {
     }
 
     /// A float that is not below the frame's value of the given `t`.
+    #[inline(always)]
     pub fn t_above(&self, t: f64) -> f32 {
         f32_above(t * self.t_scale)
     }
@@ -169,9 +182,9 @@ mod tests {
                 for length in sizes {
                     let ray = Ray::new([origin, 0.0, -origin], [length, -length / 3.0, 0.0]);
                     let ray = ray.prepare(reach).expect("a valid ray");
-                    let longest = largest(ray.direction);
+                    let longest = f32::from_bits(largest_bits(ray.direction));
                     assert!((1.0..2.0).contains(&longest), "{length} {longest}");
-                    assert!(largest(ray.origin) <= ray.reach && ray.reach <= 4.0);
+                    assert!(largest_bits(ray.origin) <= ray.reach.to_bits() && ray.reach <= 4.0);
                     let size = origin.max(reach);
                     if size >= 1e-37 {
                         assert!(ray.reach >= 0.5, "{size} {}", ray.reach);

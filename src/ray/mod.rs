@@ -6,7 +6,7 @@ mod frame;
 mod slab;
 
 pub(crate) use frame::PreparedRay;
-pub(crate) use slab::{NarrowSlab, Slab, WideSlab};
+pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".
 pub const NONE: u32 = u32::MAX;

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{Interval, PreparedRay};
 use crate::math::rounding::{UNIT32, f32_above, f32_below, gamma};
 use crate::math::{Aabb, wide};
-use crate::simd::{Lanes, Width};
+use crate::simd::{Lanes, Width, mul_sub};
 
 /// A ray made ready for boxes.
 ///
@@ -18,13 +18,15 @@ pub(crate) trait Slab {
     /// The part of the ray inside the box.
     fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32>;
 
-    /// The lanes whose boxes the ray enters, and where. `walls` are lower x y z, then upper x y z.
-    fn lanes<S: Width<N>, const FUSED: bool, const N: usize>(
-        &self,
-        s: S,
-        walls: &[[f32; N]; 6],
-        t_bound: f32,
-    ) -> (u32, S::V);
+    /// The same for `N` boxes at once.
+    fn wide<'a, S: Width<N> + 'a, const N: usize>(&'a self, s: S) -> impl WideBoxes<S, N> + 'a;
+}
+
+/// A [`Slab`] in the vectors of a backend.
+pub(crate) trait WideBoxes<S: Width<N>, const N: usize> {
+    /// The lanes whose boxes the ray enters up to `t_bound`, the same in each lane, and where.
+    /// `walls` are lower x y z, then upper x y z.
+    fn entered<const FUSED: bool>(&self, walls: &[[f32; N]; 6], t_bound: S::V) -> (u32, S::V);
 }
 
 /// Boxes in `f32`, for frames whose exponent is between -60 and 120.
@@ -36,8 +38,8 @@ pub(crate) struct NarrowSlab {
     pub(super) near_shift: [f32; 3],
     pub(super) far_shift: [f32; 3],
     t_min: f32,
-    /// For each axis the number of the wall through which the ray enters, and of the other.
-    order: [[usize; 2]; 3],
+    /// Whether the ray runs from the upper wall to the lower one, for each axis.
+    backwards: [bool; 3],
 }
 
 impl NarrowSlab {
@@ -46,25 +48,28 @@ impl NarrowSlab {
     const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
 
     /// The ray for boxes, if its frame is neither too small nor too large for them.
+    #[inline(always)]
     pub fn new(ray: &PreparedRay) -> Option<Self> {
         const NEGLIGIBLE: f32 = 1.0 / (1u64 << 57) as f32;
         if !(-60..=120).contains(&ray.exponent) {
             return None;
         }
-        let inverse = ray.direction.map(|d| (1.0 / d.abs().max(Self::SLOWEST)).copysign(d));
-        let shift = |k: usize, sign: f32| {
-            let (o, i) = (ray.origin[k], inverse[k]);
-            let steady = 12.0 * UNIT32 * ray.reach;
-            let pad = i.abs() * (6.0 * UNIT32 * o.abs() + NEGLIGIBLE * ray.reach) + steady;
-            o * i + sign * pad
-        };
+        let inverse = ray.direction.map(|d| {
+            let size = d.abs();
+            (1.0 / if size < Self::SLOWEST { Self::SLOWEST } else { size }).copysign(d)
+        });
+        let steady = 12.0 * UNIT32 * ray.reach;
+        let pads = [0, 1, 2].map(|k| {
+            let o = ray.origin[k].abs();
+            inverse[k].abs() * (6.0 * UNIT32 * o + NEGLIGIBLE * ray.reach) + steady
+        });
+        let middle = [0, 1, 2].map(|k| ray.origin[k] * inverse[k]);
         Some(NarrowSlab {
             reciprocal: inverse.map(|i| i * ray.scale),
-            near_shift: [0, 1, 2].map(|k| shift(k, 1.0)),
-            far_shift: [0, 1, 2].map(|k| shift(k, -1.0)),
+            near_shift: [0, 1, 2].map(|k| middle[k] + pads[k]),
+            far_shift: [0, 1, 2].map(|k| middle[k] - pads[k]),
             t_min: ray.t_min,
-            order: [0, 1, 2]
-                .map(|k| if inverse[k].is_sign_negative() { [k + 3, k] } else { [k, k + 3] }),
+            backwards: inverse.map(f32::is_sign_negative),
         })
     }
 }
@@ -87,23 +92,43 @@ impl Slab for NarrowSlab {
     }
 
     #[inline(always)]
-    fn lanes<S: Width<N>, const FUSED: bool, const N: usize>(
-        &self,
-        s: S,
-        walls: &[[f32; N]; 6],
-        t_bound: f32,
-    ) -> (u32, S::V) {
-        let (mut near, mut far) = (s.splat(self.t_min), s.splat(t_bound));
+    fn wide<'a, S: Width<N> + 'a, const N: usize>(&'a self, s: S) -> impl WideBoxes<S, N> + 'a {
+        NarrowBoxes {
+            reciprocal: splat(s, self.reciprocal),
+            near_shift: splat(s, self.near_shift),
+            far_shift: splat(s, self.far_shift),
+            t_min: s.splat(self.t_min),
+            backwards: self.backwards,
+            s,
+        }
+    }
+}
+
+#[inline(always)]
+fn splat<S: Width<N>, const N: usize>(s: S, [x, y, z]: [f32; 3]) -> [S::V; 3] {
+    [s.splat(x), s.splat(y), s.splat(z)]
+}
+
+/// A [`NarrowSlab`] with each number in all lanes.
+struct NarrowBoxes<S, V> {
+    s: S,
+    reciprocal: [V; 3],
+    near_shift: [V; 3],
+    far_shift: [V; 3],
+    t_min: V,
+    backwards: [bool; 3],
+}
+
+impl<S: Width<N>, const N: usize> WideBoxes<S, N> for NarrowBoxes<S, S::V> {
+    #[inline(always)]
+    fn entered<const FUSED: bool>(&self, walls: &[[f32; N]; 6], t_bound: S::V) -> (u32, S::V) {
+        let (mut near, mut far) = (self.t_min, t_bound);
         for k in 0..3 {
-            let r = s.splat(self.reciprocal[k]);
-            let (near_shift, far_shift) = (s.splat(self.near_shift[k]), s.splat(self.far_shift[k]));
-            let (first, last) =
-                (s.load(&walls[self.order[k][0]]), s.load(&walls[self.order[k][1]]));
-            let (enter, leave) = if FUSED {
-                (first.fast_mul_sub(r, near_shift), last.fast_mul_sub(r, far_shift))
-            } else {
-                (first.mul(r).sub(near_shift), last.mul(r).sub(far_shift))
-            };
+            let (lower, upper) = (&walls[k], &walls[k + 3]);
+            let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
+            let r = self.reciprocal[k];
+            let enter = mul_sub::<_, FUSED, N>(self.s.load(first), r, self.near_shift[k]);
+            let leave = mul_sub::<_, FUSED, N>(self.s.load(last), r, self.far_shift[k]);
             near = enter.max(near);
             far = leave.min(far);
         }
@@ -168,23 +193,27 @@ impl Slab for WideSlab {
         Interval { near: f32_below(part.near), far: f32_above(part.far) }
     }
 
-    fn lanes<S: Width<N>, const FUSED: bool, const N: usize>(
-        &self,
-        s: S,
-        walls: &[[f32; N]; 6],
-        t_bound: f32,
-    ) -> (u32, S::V) {
-        let (mut mask, mut near) = (0, [0.0; N]);
+    #[inline(always)]
+    fn wide<'a, S: Width<N> + 'a, const N: usize>(&'a self, s: S) -> impl WideBoxes<S, N> + 'a {
+        (self, s)
+    }
+}
+
+/// Lane by lane.
+impl<S: Width<N>, const N: usize> WideBoxes<S, N> for (&WideSlab, S) {
+    fn entered<const FUSED: bool>(&self, walls: &[[f32; N]; 6], t_bound: S::V) -> (u32, S::V) {
+        let (mut mask, mut near, mut bounds) = (0, [0.0; N], [0.0; N]);
+        t_bound.store(&mut bounds);
         for (lane, near) in near.iter_mut().enumerate() {
             let corner = |first: usize| [0, 1, 2].map(|k| walls[first + k][lane]);
             let aabb = Aabb { lower: corner(0), upper: corner(3) };
-            let part = self.part(&aabb, t_bound);
+            let part = self.0.part(&aabb, bounds[lane]);
             // A lane without a child is an empty box with infinite walls.
             let entered = !part.is_empty() && aabb.lower[0] <= aabb.upper[0];
             mask |= u32::from(entered) << lane;
             *near = part.near;
         }
-        (mask, s.load(&near))
+        (mask, self.1.load(&near))
     }
 }
 

@@ -9,7 +9,6 @@ use raykern_harness::make::Random;
 use raykern_harness::search::{Worst, samples};
 
 use super::sphere::{chord, sphere};
-use super::triangle::Depths;
 use super::triangle::single::{
     Sieved, area, area_error, coordinate_error, rise_error, sheared, sieve,
 };
@@ -107,7 +106,7 @@ fn triangle_is_right(random: &mut Random, worst: &mut TriangleWorst) -> bool {
     let Some(ray) = limited(random, ray, met.map(|met| met.t)).prepare(reach) else { return true };
     let far = met.map(|met| ray.t_above(met.t + met.t_error * 1.01));
     let bound = far.filter(|_| random.below(2) == 0).unwrap_or(ray.t_max).min(ray.t_max);
-    let sieved = sieve(&ray, &Depths::new(&ray, bound), corners);
+    let sieved = sieve(&ray, bound, corners);
     let hit = || is_within(&line, &Meeting::Triangle(corners), &ray);
     see_triangle(&ray, corners, met.map(|met| met.t), sieved, worst);
     let right = match (sieved, met) {
@@ -146,13 +145,13 @@ fn see_triangle(
     let all = [&p, &q, &r];
     let size = all.iter().fold(0f32, |m, v| m.max(v.x.abs()).max(v.y.abs()));
     let deepest = all.iter().fold(0f32, |m, v| m.max(v.depth.abs()));
-    let shift = coordinate_error(size, ray.shear.steepness, deepest);
+    let shift = coordinate_error(ray, size, deepest);
     for (v, real) in all.into_iter().zip(real) {
         let error = (f64::from(v.x) - real[0]).abs().max((f64::from(v.y) - real[1]).abs());
         // 2^-140: what falls below the least float.
         worst.coordinate.see(error, f64::from(shift) + 2f64.powi(-140));
     }
-    let unsure = area_error(shift, size);
+    let unsure = area_error(ray, size, deepest);
     let areas = [area(&q, &r), area(&r, &p), area(&p, &q)];
     for (i, (j, k)) in [(1, 2), (2, 0), (0, 1)].into_iter().enumerate() {
         let real = real[j][0] * real[k][1] - real[j][1] * real[k][0];
@@ -283,7 +282,7 @@ fn below_the_least_float_of_the_frame_nothing_is_rejected() {
     let prepared = ray.with_limits(0.0, unit).prepare(2f32.powi(99)).expect("a ray");
     let line = Line { origin: ray.origin, direction: ray.direction };
     assert!(is_within(&line, &Meeting::Triangle(corners), &prepared));
-    let sieved = sieve(&prepared, &Depths::new(&prepared, prepared.t_max), corners);
+    let sieved = sieve(&prepared, prepared.t_max, corners);
     assert!(sieved.is_some());
 
     let prepared = ray.with_limits(0.0, 0.75 * unit).prepare(2f32.powi(99)).expect("a ray");
@@ -298,7 +297,7 @@ fn infinite_limits_are_surely_kept() {
         let ray = Ray::new([0.003, 0.003, 0.01], direction);
         for t_min in [0.0, f32::NEG_INFINITY] {
             let ray = ray.with_limits(t_min, f32::INFINITY).prepare(0.01).expect("a ray");
-            let sieved = sieve(&ray, &Depths::new(&ray, ray.t_max), corners).expect("a hit");
+            let sieved = sieve(&ray, ray.t_max, corners).expect("a hit");
             assert!(sieved.sure && sieved.inside, "{direction:?} {t_min}");
         }
     }

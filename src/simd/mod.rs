@@ -37,6 +37,21 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn store(self, out: &mut [f32; N]);
     /// Writes the lanes of `mask` in order to the front of `out`, and anything behind them.
     fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]);
+
+    /// Of the lanes of `mask`, counted from the lowest, the number of one that is nearly the least: of the
+    /// first whose bits are, as an integer, with their number in place of the lowest ones.
+    #[inline(always)]
+    fn least_of(self, mask: u32) -> usize {
+        let mut lanes = [0.0; N];
+        self.store(&mut lanes);
+        scalar::least_of(&lanes, mask)
+    }
+}
+
+/// `a * b - c`, fused where that is faster if `FUSED` says that the bits need not be those of others.
+#[inline(always)]
+pub(crate) fn mul_sub<V: Lanes<N>, const FUSED: bool, const N: usize>(a: V, b: V, c: V) -> V {
+    if FUSED { a.fast_mul_sub(b, c) } else { a.mul(b).sub(c) }
 }
 
 /// A backend's vectors of `N` lanes.
@@ -56,6 +71,23 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
     /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
     fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V;
+
+    /// Moves those entries whose `near` is not above `t_bound` to the front of both columns, in
+    /// their order, and returns how many these are.
+    ///
+    /// # Safety
+    ///
+    /// All entries are written; both columns are equally long.
+    #[inline(always)]
+    unsafe fn keep_up_to(
+        self,
+        near: &mut [MaybeUninit<f32>],
+        refs: &mut [MaybeUninit<u32>],
+        t_bound: f32,
+    ) -> usize {
+        // SAFETY: the caller's promise.
+        unsafe { scalar::keep_up_to(near, refs, t_bound) }
+    }
 
     /// Runs `kernel` with the backend's instructions; all that it inlines may use them.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;

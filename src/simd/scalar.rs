@@ -30,6 +30,44 @@ pub(super) fn compress<T: Copy, const N: usize>(
     }
 }
 
+/// See [`Lanes::least_of`].
+#[inline(always)]
+pub(super) fn least_of<const N: usize>(lanes: &[f32; N], mask: u32) -> usize {
+    // Two bits for the number of up to four lanes.
+    let numbers = if mask.count_ones() <= 4 { 3 } else { 15 };
+    let (mut rest, mut number, mut least) = (mask, 0, i32::MAX);
+    while let Some(lane) = lanes.get(rest.trailing_zeros() as usize) {
+        let key = lane.to_bits() as i32 & !numbers | number;
+        least = if key < least { key } else { least };
+        number += 1;
+        rest &= rest - 1;
+    }
+    (least & numbers) as usize
+}
+
+/// See [`Simd::keep_up_to`].
+///
+/// # Safety
+///
+/// All entries are written.
+#[inline(always)]
+pub(super) unsafe fn keep_up_to(
+    near: &mut [MaybeUninit<f32>],
+    refs: &mut [MaybeUninit<u32>],
+    t_bound: f32,
+) -> usize {
+    let mut kept = 0;
+    for i in 0..near.len().min(refs.len()) {
+        // SAFETY: the caller's promise, and what is moved was written.
+        let t = unsafe { near[i].assume_init() };
+        near[kept] = near[i];
+        refs[kept] = refs[i];
+        // Written so that a NaN is kept.
+        kept += usize::from(!(t > t_bound));
+    }
+    kept
+}
+
 impl<const N: usize> Lanes<N> for [f32; N] {
     #[inline(always)]
     fn add(self, other: Self) -> Self {

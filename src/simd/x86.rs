@@ -276,6 +276,31 @@ impl Lanes<16> for F16 {
             _mm512_storeu_ps(out.as_mut_ptr().cast(), front);
         }
     }
+
+    #[inline(always)]
+    fn least_of(self, mask: u32) -> usize {
+        const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+        // SAFETY: a value of this type proves AVX-512; the table has 16 words.
+        unsafe {
+            let above = _mm512_set1_epi32(i32::MAX);
+            let keys =
+                _mm512_mask_compress_epi32(above, mask as __mmask16, _mm512_castps_si512(self.0));
+            let numbers = _mm512_loadu_si512(NUMBERS.as_ptr().cast());
+            if mask.count_ones() > 4 {
+                let keys =
+                    _mm512_or_si512(_mm512_andnot_si512(_mm512_set1_epi32(15), keys), numbers);
+                return _mm512_reduce_min_epi32(keys) as usize & 15;
+            }
+            let keys = _mm512_castsi512_si128(keys);
+            let keys = _mm_or_si128(
+                _mm_andnot_si128(_mm_set1_epi32(3), keys),
+                _mm512_castsi512_si128(numbers),
+            );
+            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0x4E>(keys));
+            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0xB1>(keys));
+            _mm_cvtsi128_si32(keys) as usize & 3
+        }
+    }
 }
 
 macro_rules! both {
@@ -525,6 +550,38 @@ impl Simd for Avx512 {
             let shifts = _mm512_loadu_si512(SHIFTS.as_ptr().cast());
             F16(_mm512_permutexvar_ps(_mm512_srlv_epi32(all, shifts), table.0))
         }
+    }
+
+    #[inline(always)]
+    unsafe fn keep_up_to(
+        self,
+        near: &mut [MaybeUninit<f32>],
+        refs: &mut [MaybeUninit<u32>],
+        t_bound: f32,
+    ) -> usize {
+        let count = near.len().min(refs.len());
+        let (near, refs) = (near.as_mut_ptr().cast::<f32>(), refs.as_mut_ptr().cast::<i32>());
+        let (mut from, mut kept) = (0, 0);
+        while from < count {
+            let lanes = (1u32 << (count - from).min(16)) - 1;
+            // SAFETY: the token proves AVX-512. Lanes below `count` are read and written, no others;
+            // what is written lies in front of what is still to be read.
+            unsafe {
+                let lanes = lanes as __mmask16;
+                let t = _mm512_maskz_loadu_ps(lanes, near.add(from));
+                let words = _mm512_maskz_loadu_epi32(lanes, refs.add(from));
+                let bound = _mm512_set1_ps(t_bound);
+                let keep = _mm512_mask_cmp_ps_mask::<_CMP_NGT_UQ>(lanes, t, bound);
+                let front = ((1u32 << keep.count_ones()) - 1) as __mmask16;
+                let t = _mm512_maskz_compress_ps(keep, t);
+                let words = _mm512_maskz_compress_epi32(keep, words);
+                _mm512_mask_storeu_ps(near.add(kept), front, t);
+                _mm512_mask_storeu_epi32(refs.add(kept), front, words);
+                kept += keep.count_ones() as usize;
+            }
+            from += 16;
+        }
+        kept
     }
 
     #[inline(always)]
