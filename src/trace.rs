@@ -54,7 +54,7 @@ impl<D: Decide, W: Watch> Kernel for FindClosest<'_, '_, D, W> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Option<Hit> {
-        let ray = self.ray.prepare(self.block.header.reach)?;
+        let ray = self.ray.prepare_with(s, self.block.header.reach)?;
         let mut query = Closest::<D, _>::new(self.filter, &ray, self.watch);
         trace(s, self.block, &ray, &mut query);
         let Closest { best, watch, .. } = &mut query;
@@ -75,7 +75,7 @@ impl<D: Decide, W: Watch> Kernel for FindAny<'_, '_, D, W> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> bool {
-        let Some(ray) = self.ray.prepare(self.block.header.reach) else { return false };
+        let Some(ray) = self.ray.prepare_with(s, self.block.header.reach) else { return false };
         trace(s, self.block, &ray, &mut Any::<D, _>::new(self.filter, &ray, self.watch))
     }
 }
@@ -116,7 +116,7 @@ fn trace<S: Simd, Q: Query>(s: S, block: &Block, ray: &PreparedRay, query: &mut 
         return grid::walk(s, &Cells { head, words, runs, leaves }, ray, query);
     }
     // Boxes in `f32` where the frame allows.
-    match NarrowSlab::new(ray) {
+    match NarrowSlab::new(s, ray) {
         Some(slab) => boxes(s, block, &leaves, ray, &slab, query),
         None => wide_boxes(block, &leaves, ray, query),
     }

@@ -9,6 +9,7 @@ use raykern_harness::search::{Worst, samples};
 use super::{NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
+use crate::simd::Scalar;
 
 const RANGES: [[i32; 2]; 5] = [[-149, 127], [-149, -120], [60, 127], [-20, 20], [-2, 2]];
 
@@ -40,7 +41,7 @@ fn wall(random: &mut Random, reach: f32) -> f32 {
 
 /// The distances to walls, against an `f64` computation.
 fn see_walls(random: &mut Random, ray: &PreparedRay, reach: f32, worst: &mut Worst) -> bool {
-    let Some(slab) = NarrowSlab::new(ray) else { return true };
+    let Some(slab) = NarrowSlab::new(Scalar, ray) else { return true };
     let k = random.below(3);
     let d = f64::from(ray.given.direction[k]);
     if d == 0.0 {
@@ -90,7 +91,7 @@ fn boxes_hold(random: &mut Random, ray: &PreparedRay, reach: f32) -> bool {
             f64::from(part.near) <= t && t <= f64::from(part.far)
         })
     };
-    let narrow = NarrowSlab::new(ray);
+    let narrow = NarrowSlab::new(Scalar, ray);
     holds(&|bound| WideSlab::new(ray).part(&aabb, bound))
         && narrow.is_none_or(|slab| holds(&|bound| slab.part(&aabb, bound)))
 }

@@ -4,6 +4,7 @@ use super::Ray;
 use crate::exact::Line;
 use crate::math::float::{narrow_power_of_two, power_of_two};
 use crate::math::rounding::{f32_above, f32_below};
+use crate::simd::{Lanes, Scalar, Width};
 
 /// A ray that can hit something, with what every box and primitive test needs of it.
 ///
@@ -20,8 +21,11 @@ pub(crate) struct PreparedRay {
     pub scale: f32,
     /// The frame's exponent: scene and origin lie below 2^exponent, unless that is above 126.
     pub exponent: i32,
-    pub origin: [f32; 3],
-    pub direction: [f32; 3],
+    /// The fourth lane of these three means nothing: four are one vector on most machines.
+    pub origin: [f32; 4],
+    pub direction: [f32; 4],
+    /// The reciprocals of the sizes of its components, of slow ones that of [`SLOWEST`].
+    pub inverse: [f32; 4],
     /// A bound on every coordinate of scene and origin in the frame.
     pub reach: f32,
     /// From given `t` to the frame's, a power of two.
@@ -51,6 +55,10 @@ pub(crate) struct Shear {
     pub depth_rate: f32,
 }
 
+/// A component below this, against one of at least 1, moves the ray by less than what boxes are padded by:
+/// it counts as this much, so that its reciprocal is finite.
+const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
+
 /// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
 /// infinities and NaN above the others.
 #[inline(always)]
@@ -65,11 +73,29 @@ fn exponent_above(bits: u32) -> i32 {
     (bits >> 23) as i32 - 126
 }
 
-/// The floats around `x`: not above it, and not below. Mostly both are `x`.
+/// The floats around `t * scale`, the scale a power of two: not above it, and not below. Mostly both are the
+/// product.
 #[inline(always)]
-fn floats_around(x: f64) -> [f32; 2] {
-    let rounded = x as f32;
-    if f64::from(rounded) == x { [rounded; 2] } else { [f32_below(x), f32_above(x)] }
+fn floats_around(t: f32, scale: f64) -> [f32; 2] {
+    if t == f32::MAX && scale > 1.0 {
+        // The limit of most rays.
+        return [f32::MAX, f32::INFINITY];
+    }
+    // With a scale that is no normal `f32` this is an infinity, a NaN, or too small.
+    let product = t * scale as f32;
+    if product.is_normal() {
+        [product; 2]
+    } else if t == 0.0 {
+        [t; 2]
+    } else {
+        rounded_around(f64::from(t) * scale)
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn rounded_around(x: f64) -> [f32; 2] {
+    [f32_below(x), f32_above(x)]
 }
 
 const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
@@ -77,8 +103,13 @@ const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
 impl Ray {
     /// What traversal needs, or `None` for a ray that hits nothing by definition. `reach` is the
     /// largest coordinate of the scene, infinite if it is not representable.
-    #[inline(always)]
     pub(crate) fn prepare(&self, reach: f32) -> Option<PreparedRay> {
+        self.prepare_with(Scalar, reach)
+    }
+
+    /// The same, by the instructions of a backend.
+    #[inline(always)]
+    pub(crate) fn prepare_with<S: Width<4>>(&self, s: S, reach: f32) -> Option<PreparedRay> {
         let (farthest, longest) = (largest_bits(self.origin), largest_bits(self.direction));
         let t_min = if self.t_min < -f32::MAX { -f32::MAX } else { self.t_min };
         let t_max = if self.t_max > f32::MAX { f32::MAX } else { self.t_max };
@@ -91,39 +122,49 @@ impl Ray {
         let scale = narrow_power_of_two(-exponent);
         // Subnormal components have no exponent of their own: a first step brings them up.
         let lift = if longest < f32::MIN_POSITIVE.to_bits() { 24 } else { 0 };
-        let lifted = |x: f32| if lift == 0 { x } else { x * narrow_power_of_two(lift) };
-        let length = exponent_above(lifted(f32::from_bits(longest)).to_bits()) - 1;
-        let shorten = narrow_power_of_two(-length);
-        let direction = self.direction.map(|x| lifted(x) * shorten);
+        let lifted = narrow_power_of_two(lift);
+        let length = exponent_above((f32::from_bits(longest) * lifted).to_bits()) - 1;
+        let [x, y, z] = self.direction;
+        let given = s.load(&[x, y, z, 0.0]).mul(s.splat(lifted));
+        let direction = given.mul(s.splat(narrow_power_of_two(-length)));
+        let [x, y, z] = self.origin;
+        let origin = s.load(&[x, y, z, 0.0]).mul(s.splat(scale));
+        let inverse = s.splat(1.0).div(direction.abs().max(s.splat(SLOWEST)));
         let t_scale = power_of_two(length - lift - exponent);
-        let [t_min_below, t_min_above] = floats_around(f64::from(t_min) * t_scale);
-        let [t_max_below, t_max_above] = floats_around(f64::from(t_max) * t_scale);
+        let [t_min_below, t_min_above] = floats_around(t_min, t_scale);
+        let [t_max_below, t_max_above] = floats_around(t_max, t_scale);
         let reach = f32::from_bits(reach) * scale;
+        let array = |v: S::V| {
+            let mut lanes = [0.0; 4];
+            v.store(&mut lanes);
+            lanes
+        };
+        let (direction, inverse) = (array(direction), array(inverse));
         Some(PreparedRay {
             given: Ray { t_min, t_max, ..*self },
             scale,
             exponent,
-            origin: self.origin.map(|x| x * scale),
+            origin: array(origin),
             direction,
+            inverse,
             reach: if reach > 4.0 { 4.0 } else { reach },
             t_scale,
             t_min: t_min_below,
             t_max: t_max_above,
             t_inside: [t_min_above, t_max_below],
-            shear: Shear::new(direction),
+            shear: Shear::new(&direction, &inverse),
         })
     }
 }
 
 impl Shear {
     #[inline(always)]
-    fn new(direction: [f32; 3]) -> Self {
-        let [x, y, z] = direction.map(f32::abs);
+    fn new(direction: &[f32; 4], inverse: &[f32; 4]) -> Self {
+        let [x, y, z, _] = direction.map(|x| x.to_bits() & !(1 << 31));
         let depth = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
         let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][depth];
+        let slope = [axes[0], axes[1]].map(|axis| direction[axis] * inverse[depth]);
         let depth_rate = direction[depth].abs();
-        let inverse = 1.0 / depth_rate;
-        let slope = [axes[0], axes[1]].map(|axis| direction[axis] * inverse);
         let [a, b] = slope.map(f32::abs);
         Shear {
             axes,
@@ -174,6 +215,10 @@ mod tests {
         assert!(good.with_limits(f32::NEG_INFINITY, f32::INFINITY).prepare(1.0).is_some());
     }
 
+    fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {
+        [x, y, z]
+    }
+
     #[test]
     fn the_frame_holds_everything_whatever_the_scale() {
         let sizes = [1e-45, 1e-44, 3e-39, 1e-20, 0.3, 1.0, 7e5, 3e38, f32::MAX];
@@ -182,9 +227,11 @@ mod tests {
                 for length in sizes {
                     let ray = Ray::new([origin, 0.0, -origin], [length, -length / 3.0, 0.0]);
                     let ray = ray.prepare(reach).expect("a valid ray");
-                    let longest = f32::from_bits(largest_bits(ray.direction));
+                    let longest = f32::from_bits(largest_bits(three(ray.direction)));
                     assert!((1.0..2.0).contains(&longest), "{length} {longest}");
-                    assert!(largest_bits(ray.origin) <= ray.reach.to_bits() && ray.reach <= 4.0);
+                    assert!(
+                        largest_bits(three(ray.origin)) <= ray.reach.to_bits() && ray.reach <= 4.0
+                    );
                     let size = origin.max(reach);
                     if size >= 1e-37 {
                         assert!(ray.reach >= 0.5, "{size} {}", ray.reach);

@@ -34,43 +34,38 @@ pub(crate) trait WideBoxes<S: Width<N>, const N: usize> {
 /// With `r` the scaled reciprocal of a component, the distance to a wall is `wall * r - shift`, where
 /// `shift` holds `origin * r` and all that rounding may add. `docs/METHODS.md` derives the padding.
 pub(crate) struct NarrowSlab {
-    pub(super) reciprocal: [f32; 3],
-    pub(super) near_shift: [f32; 3],
-    pub(super) far_shift: [f32; 3],
+    pub(super) reciprocal: [f32; 4],
+    pub(super) near_shift: [f32; 4],
+    pub(super) far_shift: [f32; 4],
     t_min: f32,
     /// Whether the ray runs from the upper wall to the lower one, for each axis.
     backwards: [bool; 3],
 }
 
 impl NarrowSlab {
-    /// A component below this, against one of at least 1, moves the ray by less than the padding: it
-    /// counts as this much, so that its reciprocal is finite.
-    const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
-
     /// The ray for boxes, if its frame is neither too small nor too large for them.
     #[inline(always)]
-    pub fn new(ray: &PreparedRay) -> Option<Self> {
+    pub fn new<S: Width<4>>(s: S, ray: &PreparedRay) -> Option<Self> {
         const NEGLIGIBLE: f32 = 1.0 / (1u64 << 57) as f32;
         if !(-60..=120).contains(&ray.exponent) {
             return None;
         }
-        let inverse = ray.direction.map(|d| {
-            let size = d.abs();
-            (1.0 / if size < Self::SLOWEST { Self::SLOWEST } else { size }).copysign(d)
-        });
-        let steady = 12.0 * UNIT32 * ray.reach;
-        let pads = [0, 1, 2].map(|k| {
-            let o = ray.origin[k].abs();
-            inverse[k].abs() * (6.0 * UNIT32 * o + NEGLIGIBLE * ray.reach) + steady
-        });
-        let middle = [0, 1, 2].map(|k| ray.origin[k] * inverse[k]);
-        Some(NarrowSlab {
-            reciprocal: inverse.map(|i| i * ray.scale),
-            near_shift: [0, 1, 2].map(|k| middle[k] + pads[k]),
-            far_shift: [0, 1, 2].map(|k| middle[k] - pads[k]),
+        let (origin, size) = (s.load(&ray.origin), s.load(&ray.inverse));
+        let inverse = size.with_sign_of(s.load(&ray.direction));
+        let relative = origin.abs().mul(s.splat(6.0 * UNIT32)).add(s.splat(NEGLIGIBLE * ray.reach));
+        let pad = size.mul(relative).add(s.splat(12.0 * UNIT32 * ray.reach));
+        let middle = origin.mul(inverse);
+        let mut slab = NarrowSlab {
+            reciprocal: [0.0; 4],
+            near_shift: [0.0; 4],
+            far_shift: [0.0; 4],
             t_min: ray.t_min,
-            backwards: inverse.map(f32::is_sign_negative),
-        })
+            backwards: [0, 1, 2].map(|k| ray.direction[k].is_sign_negative()),
+        };
+        inverse.mul(s.splat(ray.scale)).store(&mut slab.reciprocal);
+        middle.add(pad).store(&mut slab.near_shift);
+        middle.sub(pad).store(&mut slab.far_shift);
+        Some(slab)
     }
 }
 
@@ -105,7 +100,7 @@ impl Slab for NarrowSlab {
 }
 
 #[inline(always)]
-fn splat<S: Width<N>, const N: usize>(s: S, [x, y, z]: [f32; 3]) -> [S::V; 3] {
+fn splat<S: Width<N>, const N: usize>(s: S, [x, y, z, _]: [f32; 4]) -> [S::V; 3] {
     [s.splat(x), s.splat(y), s.splat(z)]
 }
 
@@ -221,12 +216,13 @@ impl<S: Width<N>, const N: usize> WideBoxes<S, N> for (&WideSlab, S) {
 mod tests {
     use super::*;
     use crate::ray::Ray;
+    use crate::simd::Scalar;
 
     const UNIT_BOX: Aabb = Aabb { lower: [0.0; 3], upper: [1.0; 3] };
 
     fn parts(ray: Ray) -> [Interval<f32>; 2] {
         let ray = ray.prepare(1.0).expect("a valid ray");
-        let narrow = NarrowSlab::new(&ray).expect("an ordinary frame");
+        let narrow = NarrowSlab::new(Scalar, &ray).expect("an ordinary frame");
         // In given units, as the frame's are twice as long or half.
         [narrow.part(&UNIT_BOX, ray.t_max), WideSlab::new(&ray).part(&UNIT_BOX, ray.t_max)].map(
             |part| {
@@ -269,7 +265,7 @@ mod tests {
     fn frames_at_the_ends_of_the_range_take_wide_boxes() {
         for (size, narrow) in [(1e-30, false), (1e-17, true), (1e35, true), (3e38, false)] {
             let ray = Ray::new([size, 0.0, 0.0], [1.0, 0.0, 0.0]).prepare(size).expect("a ray");
-            assert_eq!(NarrowSlab::new(&ray).is_some(), narrow, "{size}");
+            assert_eq!(NarrowSlab::new(Scalar, &ray).is_some(), narrow, "{size}");
         }
     }
 }

@@ -37,8 +37,8 @@ pub(super) struct Chord {
 }
 
 pub(super) fn chord(ray: &PreparedRay, centre: [f32; 3], r: f32) -> Chord {
-    let d = Vec3::from(ray.direction);
-    let v = Vec3::from(ray.origin) - Vec3::from(centre) * ray.scale;
+    let d = Vec3::from_slice(&ray.direction);
+    let v = Vec3::from_slice(&ray.origin) - Vec3::from(centre) * ray.scale;
     let (a, b) = (dot(d, d), dot(v, d));
     let middle = -(b / a);
     let l = v + d * middle;

@@ -443,8 +443,8 @@ fn plane(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Option<(f32, f32)> {
     let [a, b, c] = corners.map(|vertex| Vec3::from(vertex) * ray.scale);
     let (e1, e2) = (b - a, c - a);
     let n = cross(e1, e2);
-    let d = Vec3::from(ray.direction);
-    let to_plane = a - Vec3::from(ray.origin);
+    let d = Vec3::from_slice(&ray.direction);
+    let to_plane = a - Vec3::from_slice(&ray.origin);
     let along = dot(d, n);
     let size = 8.5 * UNIT32 * sum_abs(e1) * sum_abs(e2);
     let along_error = sum_abs(d) * size + TINY;
