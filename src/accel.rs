@@ -1,5 +1,6 @@
 //! The face of a built structure.
 
+use crate::batch;
 use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID, KIND_LIST};
 use crate::bvh;
 use crate::error::OpenError;
@@ -10,10 +11,8 @@ use crate::query::{
     flat_number,
 };
 use crate::ray::{Hit, PreparedRay, Ray};
-#[cfg(feature = "capi")]
-use crate::storage;
 use crate::surface::{self, Surface};
-use crate::trace;
+use crate::trace::{self, AnyHit, ClosestHit};
 
 /// What a block holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,12 +94,10 @@ impl<'m> Accel<'m> {
     /// `block` is the first byte of such a block, which nobody writes to during `'m`.
     #[cfg(feature = "capi")]
     #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
+    #[inline]
     pub(crate) unsafe fn from_ptr(block: *const u8) -> Option<Accel<'m>> {
-        // SAFETY: the header is the first part of the block.
-        let size = unsafe { Block::size_at(block) };
-        // SAFETY: a block has as many bytes as its header says.
-        let bytes = unsafe { storage::from_raw(block, size) };
-        Accel::recognise(bytes).ok()
+        // SAFETY: the caller's promise.
+        unsafe { Block::known(block) }.map(Accel)
     }
 
     fn is_sound(&self) -> bool {
@@ -196,15 +193,44 @@ impl<'m> Accel<'m> {
     /// [`intersect`](Self::intersect) for each ray; a miss is written as [`Hit::MISS`]. Stops at the
     /// end of the shorter slice.
     pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Hit]) {
-        for (ray, hit) in rays.iter().zip(hits) {
-            *hit = self.intersect(ray).unwrap_or(Hit::MISS);
-        }
+        self.intersect_batch_with(rays, &QueryOptions::default(), hits);
     }
 
     /// [`occluded`](Self::occluded) for each ray. Stops at the end of the shorter slice.
     pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        for (ray, occluded) in rays.iter().zip(occluded) {
-            *occluded = self.occluded(ray);
+        self.occluded_batch_with(rays, &QueryOptions::default(), occluded);
+    }
+
+    /// [`intersect_with`](Self::intersect_with) for each ray; a miss is written as [`Hit::MISS`].
+    /// Stops at the end of the shorter slice.
+    pub fn intersect_batch_with(&self, rays: &[Ray], options: &QueryOptions, hits: &mut [Hit]) {
+        let (block, filter) = (&self.0, self.filter(options));
+        let keep = |hit: Option<Hit>| hit.unwrap_or(Hit::MISS);
+        match options.precision {
+            Precision::Exact => {
+                // Many of them are in flight, so each had better be small.
+                let question = ClosestHit::<Exact, _, 0>::new(filter, ());
+                batch::ask_all(block, rays, hits, question, keep);
+            }
+            Precision::Watertight => {
+                let question = ClosestHit::<Watertight, _, 1>::new(filter, ());
+                batch::ask_each(block, rays, hits, question, keep);
+            }
+        }
+    }
+
+    /// [`occluded_with`](Self::occluded_with) for each ray. Stops at the end of the shorter slice.
+    pub fn occluded_batch_with(&self, rays: &[Ray], options: &QueryOptions, occluded: &mut [bool]) {
+        let (block, filter) = (&self.0, self.filter(options));
+        let keep = |occluded| occluded;
+        match options.precision {
+            Precision::Exact => {
+                batch::ask_all(block, rays, occluded, AnyHit::<Exact, _>::new(filter, ()), keep);
+            }
+            Precision::Watertight => {
+                let question = AnyHit::<Watertight, _>::new(filter, ());
+                batch::ask_each(block, rays, occluded, question, keep);
+            }
         }
     }
 
@@ -232,8 +258,12 @@ impl<'m> Accel<'m> {
     ) -> Option<Hit> {
         let (block, filter) = (&self.0, self.filter(options));
         match options.precision {
-            Precision::Exact => trace::closest::<Exact, _>(block, ray, filter, watch),
-            Precision::Watertight => trace::closest::<Watertight, _>(block, ray, filter, watch),
+            Precision::Exact => {
+                trace::ask(block, ray, ClosestHit::<Exact, _, 1>::new(filter, watch))
+            }
+            Precision::Watertight => {
+                trace::ask(block, ray, ClosestHit::<Watertight, _, 1>::new(filter, watch))
+            }
         }
     }
 
@@ -241,8 +271,10 @@ impl<'m> Accel<'m> {
     fn occluded_watched(&self, ray: &Ray, options: &QueryOptions, watch: impl Watch) -> bool {
         let (block, filter) = (&self.0, self.filter(options));
         match options.precision {
-            Precision::Exact => trace::any::<Exact, _>(block, ray, filter, watch),
-            Precision::Watertight => trace::any::<Watertight, _>(block, ray, filter, watch),
+            Precision::Exact => trace::ask(block, ray, AnyHit::<Exact, _>::new(filter, watch)),
+            Precision::Watertight => {
+                trace::ask(block, ray, AnyHit::<Watertight, _>::new(filter, watch))
+            }
         }
     }
 

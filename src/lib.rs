@@ -51,6 +51,7 @@ compile_error!("raykern needs square roots: enable the feature `std` or the feat
 struct Readme;
 
 mod accel;
+mod batch;
 mod block;
 mod build;
 mod bvh;

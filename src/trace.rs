@@ -1,5 +1,7 @@
 //! One ray through one block: a question, compiled once for each backend from the ray to the answer.
 
+use core::marker::PhantomData;
+
 use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
@@ -8,25 +10,128 @@ use crate::query::{Any, Closest, Decide, Filter, Locate, Meets, Query, Watch, ge
 use crate::ray::{Hit, NONE, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
-/// The closest hit that `filter` leaves.
-#[inline(always)]
-pub(crate) fn closest<D: Decide, W: Watch>(
-    block: &Block,
-    ray: &Ray,
-    filter: Filter,
-    watch: W,
-) -> Option<Hit> {
-    let question =
-        FindClosest { block, ray, filter, watch, decide: core::marker::PhantomData::<D> };
-    // What is counted need not be fast, which saves its code for every backend.
-    if W::COUNTS { question.run(Scalar) } else { simd::dispatch(question) }
+/// What is asked of a ray.
+pub(crate) trait Question {
+    type Query: Query;
+    type Answer;
+
+    fn query(self, ray: &PreparedRay) -> Self::Query;
+
+    /// The answer, from a query that a traversal has fed; `ended` is whether it ended the search.
+    fn answer(
+        block: &Block,
+        ray: &PreparedRay,
+        query: &mut Self::Query,
+        ended: bool,
+    ) -> Self::Answer;
+
+    /// The answer of a ray that can hit nothing.
+    fn nothing() -> Self::Answer;
 }
 
-/// Whether anything is hit that `filter` leaves.
+/// The closest hit that the filter leaves.
+#[derive(Clone, Copy)]
+///
+/// `MEMORY` as for [`Closest`].
+pub(crate) struct ClosestHit<'m, D, W, const MEMORY: usize = 1> {
+    filter: Filter<'m>,
+    watch: W,
+    decide: PhantomData<D>,
+}
+
+/// Whether anything is hit that the filter leaves.
+#[derive(Clone, Copy)]
+pub(crate) struct AnyHit<'m, D, W> {
+    filter: Filter<'m>,
+    watch: W,
+    decide: PhantomData<D>,
+}
+
+impl<'m, D, W, const MEMORY: usize> ClosestHit<'m, D, W, MEMORY> {
+    #[inline(always)]
+    pub fn new(filter: Filter<'m>, watch: W) -> Self {
+        ClosestHit { filter, watch, decide: PhantomData }
+    }
+}
+
+impl<'m, D, W> AnyHit<'m, D, W> {
+    #[inline(always)]
+    pub fn new(filter: Filter<'m>, watch: W) -> Self {
+        AnyHit { filter, watch, decide: PhantomData }
+    }
+}
+
+impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D, W, MEMORY> {
+    type Query = Closest<'m, D, W, MEMORY>;
+    type Answer = Option<Hit>;
+
+    #[inline(always)]
+    fn query(self, ray: &PreparedRay) -> Self::Query {
+        Closest::new(self.filter, ray, self.watch)
+    }
+
+    #[inline(always)]
+    fn answer(
+        block: &Block,
+        ray: &PreparedRay,
+        query: &mut Self::Query,
+        _ended: bool,
+    ) -> Option<Hit> {
+        let Closest { best, watch, .. } = query;
+        Some(hit::<D>(block, ray, best.as_ref()?, watch))
+    }
+
+    fn nothing() -> Option<Hit> {
+        None
+    }
+}
+
+impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
+    type Query = Any<'m, D, W>;
+    type Answer = bool;
+
+    #[inline(always)]
+    fn query(self, ray: &PreparedRay) -> Self::Query {
+        Any::new(self.filter, ray, self.watch)
+    }
+
+    #[inline(always)]
+    fn answer(_: &Block, _: &PreparedRay, _: &mut Self::Query, ended: bool) -> bool {
+        ended
+    }
+
+    fn nothing() -> bool {
+        false
+    }
+}
+
+/// The answer to `question` for one ray.
 #[inline(always)]
-pub(crate) fn any<D: Decide, W: Watch>(block: &Block, ray: &Ray, filter: Filter, watch: W) -> bool {
-    let question = FindAny { block, ray, filter, watch, decide: core::marker::PhantomData::<D> };
-    if W::COUNTS { question.run(Scalar) } else { simd::dispatch(question) }
+pub(crate) fn ask<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
+    let ask = Ask { block, ray, question };
+    // What is counted need not be fast, which saves its code for every backend.
+    if <Q::Query as Query>::Watch::COUNTS { ask.run(Scalar) } else { simd::dispatch(ask) }
+}
+
+/// One ray, waiting for a backend.
+pub(crate) struct Ask<'a, 'm, Q> {
+    pub block: &'a Block<'m>,
+    pub ray: &'a Ray,
+    pub question: Q,
+}
+
+impl<Q: Question> Kernel for Ask<'_, '_, Q> {
+    type Output = Q::Answer;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Q::Answer {
+        let Some(ray) = self.ray.prepare_with(s, self.block.header.reach) else {
+            return Q::nothing();
+        };
+        let mut query = self.question.query(&ray);
+        let ended = trace(s, self.block, &ray, &mut query);
+        Q::answer(self.block, &ray, &mut query, ended)
+    }
 }
 
 /// The meeting with the primitive of this flat number at this answered `t`.
@@ -36,48 +141,9 @@ pub(crate) fn locate<D: Decide>(
     number: u32,
     t: f32,
 ) -> Option<D::Met> {
-    let question = Find { block, ray, query: Locate::<D>::new(number, t, ray, block.prim_ids) };
+    let find = Find { block, ray, query: Locate::<D>::new(number, t, ray, block.prim_ids) };
     // Hits of the watertight mode, which is tried second, are rarely looked up.
-    if D::ANY_BOXES { simd::dispatch(question) } else { question.run(Scalar) }
-}
-
-struct FindClosest<'a, 'm, D, W> {
-    block: &'a Block<'m>,
-    ray: &'a Ray,
-    filter: Filter<'m>,
-    watch: W,
-    decide: core::marker::PhantomData<D>,
-}
-
-impl<D: Decide, W: Watch> Kernel for FindClosest<'_, '_, D, W> {
-    type Output = Option<Hit>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> Option<Hit> {
-        let ray = self.ray.prepare_with(s, self.block.header.reach)?;
-        let mut query = Closest::<D, _>::new(self.filter, &ray, self.watch);
-        trace(s, self.block, &ray, &mut query);
-        let Closest { best, watch, .. } = &mut query;
-        Some(hit::<D>(self.block, &ray, best.as_ref()?, watch))
-    }
-}
-
-struct FindAny<'a, 'm, D, W> {
-    block: &'a Block<'m>,
-    ray: &'a Ray,
-    filter: Filter<'m>,
-    watch: W,
-    decide: core::marker::PhantomData<D>,
-}
-
-impl<D: Decide, W: Watch> Kernel for FindAny<'_, '_, D, W> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> bool {
-        let Some(ray) = self.ray.prepare_with(s, self.block.header.reach) else { return false };
-        trace(s, self.block, &ray, &mut Any::<D, _>::new(self.filter, &ray, self.watch))
-    }
+    if D::ANY_BOXES { simd::dispatch(find) } else { find.run(Scalar) }
 }
 
 struct Find<'a, 'm, D: Decide> {

@@ -1,13 +1,13 @@
 //! Measures one scene: every method on the same rays, in turns.
 
 use anyhow::{Result, ensure};
-use raykern::{Layout, Ray};
+use raykern::{Accel, Counts, Layout, QueryOptions, Ray};
 
 use crate::check::{Answers, hold_against_list};
 use crate::lineup::{Class, Lineup, Structure, Subject};
 use crate::options::Options;
 use crate::ours;
-use crate::rays::{Kind, RayMaker};
+use crate::rays::{Kind, Question, RayMaker};
 use crate::scenes::{Case, Loaded};
 use crate::watch::{Cost, Watch, median};
 
@@ -37,6 +37,8 @@ pub struct KindResult {
     pub rays: usize,
     /// The share of them that hit.
     pub hit_share: f64,
+    /// What our BVH visited and tested for all of them.
+    pub visits: Counts,
     /// Each method, in the order of the subjects.
     pub methods: Vec<MethodResult>,
 }
@@ -98,7 +100,13 @@ pub fn measure(
                 kind.name()
             );
         }
-        kinds.push(KindResult { kind, rays: rays.len(), hit_share: right.hit_share(), methods });
+        kinds.push(KindResult {
+            kind,
+            rays: rays.len(),
+            hit_share: right.hit_share(),
+            visits: visits(&accel, &rays, kind.question()),
+            methods,
+        });
     }
     Ok(SceneResult {
         name: case.name.clone(),
@@ -109,6 +117,18 @@ pub fn measure(
         kinds,
         notes: lineup.notes,
     })
+}
+
+/// What the BVH visits and tests for these rays.
+fn visits(accel: &Accel, rays: &[Ray], question: Question) -> Counts {
+    let (mut counts, options) = (Counts::default(), QueryOptions::default());
+    for ray in rays {
+        match question {
+            Question::Closest => drop(accel.intersect_counted(ray, &options, &mut counts)),
+            Question::Any => drop(accel.occluded_counted(ray, &options, &mut counts)),
+        }
+    }
+    counts
 }
 
 /// How many answers may differ. Peers are counted, not judged, but in a quick run, whose scenes are

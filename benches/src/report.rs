@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
+use raykern::Counts;
 
 use crate::measure::{KindResult, MethodResult, SceneResult};
 use crate::options::Options;
@@ -55,6 +56,18 @@ pub fn scene(result: &SceneResult) {
     table(result, "answers unlike ours", |_, method| {
         (method.differing > 0).then(|| method.differing.to_string())
     });
+    let visits: [(&str, fn(&Counts) -> u64); 4] = [
+        ("(bvh: nodes or bundles a ray)", |counts| counts.steps),
+        ("(bvh: leaf blocks a ray)", |counts| counts.blocks),
+        ("(bvh: t in f64 a ray)", |counts| counts.intervals),
+        ("(bvh: decisions in integers a ray)", |counts| counts.exact + counts.roundings),
+    ];
+    for (name, count) in visits {
+        print!("  {name:<36}");
+        let each = |kind: &KindResult| count(&kind.visits) as f64 / kind.rays.max(1) as f64;
+        result.kinds.iter().for_each(|kind| print!("{:>11.3}", each(kind)));
+        println!();
+    }
     print!("  {:<36}", "(rays that hit, %)");
     result.kinds.iter().for_each(|kind| print!("{:>11.1}", 100.0 * kind.hit_share));
     println!("\n");

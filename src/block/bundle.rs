@@ -64,6 +64,8 @@ pub(crate) struct ChildRef(pub u32);
 impl ChildRef {
     /// No child.
     pub const NONE: ChildRef = ChildRef(u32::MAX);
+    /// The first bundle.
+    pub const ROOT: ChildRef = ChildRef(0);
     const LEAF: u32 = 1 << 31;
     const SPHERES: u32 = 1 << 30;
 

@@ -52,12 +52,13 @@ impl TriangleBlock {
     /// The vertices of triangle `i < 16`, whatever the block holds.
     #[inline(always)]
     pub fn triangle(&self, i: usize) -> [[f32; 3]; 3] {
-        let i = i % TRIANGLES;
-        self.corners.map(|list| {
-            // A nibble is below 16, so no index here can be out of range.
-            let (byte, shift) = nibble(i);
+        let (byte, shift) = nibble(i % TRIANGLES);
+        let [x, y, z] = &self.vertices;
+        let [a, b, c] = &self.corners;
+        // A nibble is below 16, so no index here can be out of range.
+        [a, b, c].map(|list| {
             let v = usize::from(list[byte] >> shift & 15);
-            self.vertices.map(|axis| axis[v])
+            [x[v], y[v], z[v]]
         })
     }
 

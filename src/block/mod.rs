@@ -270,17 +270,53 @@ pub(crate) struct Block<'m> {
 }
 
 impl<'m> Block<'m> {
-    /// The size that the block at `block` has according to its header.
+    /// The parts of a block that was found right before; `None` when it does not even begin as one. One
+    /// call for one ray ends here, so nothing is checked again.
     ///
     /// # Safety
     ///
-    /// `block` points to a header, aligned as one.
+    /// `block` points to a header, aligned as one. If that begins as a block does, it is the header of a
+    /// finished block, all of which is there, and nobody writes to it during `'m`.
     #[cfg(feature = "capi")]
     #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
-    pub unsafe fn size_at(block: *const u8) -> usize {
+    #[inline]
+    pub unsafe fn known(block: *const u8) -> Option<Self> {
         // SAFETY: the caller's promise.
-        let header = unsafe { &*block.cast::<Header>() };
-        header.size as usize
+        let header: &'m Header = unsafe { &*block.cast() };
+        let begins_right = header.magic == MAGIC && header.byte_order == BYTE_ORDER;
+        if !(begins_right && header.version == VERSION) {
+            return None;
+        }
+        let Counts { prim_ids, grids, nodes, words, bundle_lanes, .. } = header.counts;
+        let Counts { geometries, sphere_blocks, triangle_blocks, runs, .. } = header.counts;
+        // SAFETY: the parts of a finished block follow each other in this order, all within `size`.
+        unsafe {
+            let mut at = At { block, offset: size_of::<Header>() };
+            let (geometries, prim_ids) = (at.part(geometries), at.part(prim_ids));
+            let (grids, nodes) = (at.part(grids), at.part(nodes));
+            let bundles = match header.layout {
+                4 => Bundles::Four(at.part(bundle_lanes / 4)),
+                8 => Bundles::Eight(at.part(bundle_lanes / 8)),
+                16 => Bundles::Sixteen(at.part(bundle_lanes / 16)),
+                _ => Bundles::None,
+            };
+            let (words, sphere_blocks) = (at.part(words), at.part(sphere_blocks));
+            let (triangle_blocks, runs) = (at.part(triangle_blocks), at.part(runs));
+            let bytes = core::slice::from_raw_parts(block, header.size as usize);
+            Some(Block {
+                bytes,
+                header,
+                geometries,
+                prim_ids,
+                grids,
+                nodes,
+                bundles,
+                words,
+                sphere_blocks,
+                triangle_blocks,
+                runs,
+            })
+        }
     }
 
     /// The parts of a block whose header is right. `bytes` may be longer than the block; what the
@@ -339,6 +375,32 @@ impl<'m> Block<'m> {
             )?,
             runs: storage::view(bytes, at.runs, counts.runs as usize)?,
         })
+    }
+}
+
+/// The way through the parts of a finished block.
+#[cfg(feature = "capi")]
+struct At {
+    block: *const u8,
+    offset: usize,
+}
+
+#[cfg(feature = "capi")]
+impl At {
+    /// The next part, of `count` elements.
+    ///
+    /// # Safety
+    ///
+    /// The elements are there, and nobody writes to them during `'m`.
+    #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
+    #[inline(always)]
+    unsafe fn part<'m, T: Plain>(&mut self, count: u32) -> &'m [T] {
+        // SAFETY: within the block, by the caller's promise.
+        let first = unsafe { self.block.add(self.offset) }.cast::<T>();
+        let size = (count as usize * size_of::<T>()).next_multiple_of(storage::ALIGNMENT);
+        self.offset += size;
+        // SAFETY: parts start at multiples of 64, `T` is plain, and the caller promises the rest.
+        unsafe { core::slice::from_raw_parts(first, count as usize) }
     }
 }
 

@@ -16,7 +16,7 @@ mod wide_build;
 pub(crate) use compact::{build, needs};
 pub(crate) use traverse::traverse;
 pub(crate) use validate::{bundles_are_sound, tree_is_sound};
-pub(crate) use wide::traverse_wide;
+pub(crate) use wide::{Walk, traverse_wide};
 pub(crate) use wide_build::{build_wide, needs_wide};
 
 /// No path from the root is longer, whatever the scene, so a stack of this many entries suffices.

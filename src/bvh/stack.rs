@@ -4,31 +4,32 @@
 
 use core::mem::MaybeUninit;
 
-use super::MAX_DEPTH;
 use crate::block::bundle::ChildRef;
 use crate::simd::{Lanes, Simd, Width};
-
-/// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry.
-const CAPACITY: usize = 15 * MAX_DEPTH + 2 * 16;
 
 /// Children to come back to, each with the `t` at which the ray enters it: two columns.
 ///
 /// All entries below `count` are written. A push writes as many lanes as a vector has and then counts those
 /// that matter, so that it takes no branch.
-pub(super) struct Stack {
-    near: [MaybeUninit<f32>; CAPACITY],
-    refs: [MaybeUninit<u32>; CAPACITY],
+pub(super) struct Stack<const ROOM: usize> {
+    near: [MaybeUninit<f32>; ROOM],
+    refs: [MaybeUninit<u32>; ROOM],
     count: usize,
 }
 
-impl Stack {
+impl<const ROOM: usize> Stack<ROOM> {
     #[inline(always)]
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         Stack {
-            near: [const { MaybeUninit::uninit() }; CAPACITY],
-            refs: [const { MaybeUninit::uninit() }; CAPACITY],
+            near: [const { MaybeUninit::uninit() }; ROOM],
+            refs: [const { MaybeUninit::uninit() }; ROOM],
             count: 0,
         }
+    }
+
+    #[inline(always)]
+    pub fn clear(&mut self) {
+        self.count = 0;
     }
 
     /// The child pushed last, or [`ChildRef::NONE`] when there is none.
@@ -39,7 +40,7 @@ impl Stack {
         ChildRef(self.reference(last))
     }
 
-    /// Pushes the children in the lanes of `mask`, in their order.
+    /// Pushes the children in the lanes of `mask`, in their order; false when there is no room.
     #[inline(always)]
     pub fn push<S: Width<W>, const W: usize>(
         &mut self,
@@ -47,35 +48,34 @@ impl Stack {
         mask: u32,
         near: S::V,
         refs: &[ChildRef; W],
-    ) {
-        let at = self.count;
-        let room = self.near.get_mut(at..).and_then(|near| near.first_chunk_mut::<W>());
-        let Some(room) = room else { return };
-        near.compress(mask, room);
-        let Some(room) = self.refs.get_mut(at..).and_then(|refs| refs.first_chunk_mut::<W>())
-        else {
-            return;
-        };
-        s.compress_words(mask, ChildRef::words(refs), room);
-        self.count = at + mask.count_ones() as usize;
+    ) -> bool {
+        let column = self.near.get_mut(self.count..).and_then(|near| near.first_chunk_mut::<W>());
+        let Some(column) = column else { return false };
+        near.compress(mask, column);
+        self.push_refs(s, mask, refs)
     }
 
-    /// Pushes the children in the lanes of `mask`, of which there are some, and takes the nearest of
-    /// them, or nearly so.
+    /// The same without a word on where they are entered: they must not be [culled](Self::cull).
     #[inline(always)]
-    pub fn push_and_take_nearest<S: Width<W>, const W: usize>(
+    pub fn push_refs<S: Width<W>, const W: usize>(
         &mut self,
         s: S,
         mask: u32,
-        near: S::V,
         refs: &[ChildRef; W],
-    ) -> ChildRef {
-        let first = self.count;
-        self.push(s, mask, near, refs);
-        let nearest = first + near.least_of(mask);
-        let Some(last) = self.count.checked_sub(1).filter(|last| nearest <= *last) else {
-            return ChildRef::NONE;
-        };
+    ) -> bool {
+        let column = self.refs.get_mut(self.count..).and_then(|refs| refs.first_chunk_mut::<W>());
+        let Some(column) = column else { return false };
+        s.compress_words(mask, ChildRef::words(refs), column);
+        self.count += mask.count_ones() as usize;
+        true
+    }
+
+    /// Takes the nearest, or nearly so, of the children in the lanes of `mask`, which were pushed last.
+    #[inline(always)]
+    pub fn pop_nearest<S: Width<W>, const W: usize>(&mut self, mask: u32, near: S::V) -> ChildRef {
+        let pushed = mask.count_ones() as usize;
+        let Some(first) = self.count.checked_sub(pushed.max(1)) else { return ChildRef::NONE };
+        let (nearest, last) = (first + near.least_of(mask).min(pushed - 1), self.count - 1);
         let taken = self.reference(nearest);
         self.near[nearest] = self.near[last];
         self.refs[nearest] = self.refs[last];

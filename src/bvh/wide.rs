@@ -1,4 +1,4 @@
-//! The one loop over bundles.
+//! The one way through bundles.
 
 use super::stack::Stack;
 use crate::block::bundle::{Bundle, ChildRef};
@@ -7,11 +7,99 @@ use crate::query::{Query, Watch};
 use crate::ray::{PreparedRay, Slab, WideBoxes};
 use crate::simd::{Simd, Width};
 
-/// Offers `query` everything the ray meets, near bundles first; true when it ended the search.
+/// Where a ray stands on its way through a tree of bundles.
 ///
 /// A bundle's children that the ray enters go to the stack in one step and the nearest of them is taken
 /// back; with one child, the usual case near the leaves, the stack is not touched. The stack is
 /// culled once for each hit that was accepted, so taking from it tests nothing.
+pub(crate) struct Walk<const ROOM: usize> {
+    stack: Stack<ROOM>,
+    at: ChildRef,
+    t_bound: f32,
+}
+
+/// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry.
+pub(crate) const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 2 * 16;
+
+impl<const ROOM: usize> Walk<ROOM> {
+    /// At the root.
+    #[inline(always)]
+    pub const fn new(t_bound: f32) -> Self {
+        Walk { stack: Stack::new(), at: ChildRef::ROOT, t_bound }
+    }
+
+    /// Back to the root, for another ray.
+    #[inline(always)]
+    pub fn restart(&mut self, t_bound: f32) {
+        self.stack.clear();
+        self.at = ChildRef::ROOT;
+        self.t_bound = t_bound;
+    }
+
+    /// What comes next; [`ChildRef::NONE`] at the end.
+    #[inline(always)]
+    pub fn at(&self) -> ChildRef {
+        self.at
+    }
+
+    /// Goes from a bundle to what comes next; false when there is no room for what is to come later.
+    /// `t_bounds` is the bound in each lane.
+    #[inline(always)]
+    pub fn enter<S: Width<W>, Q: Query, const W: usize>(
+        &mut self,
+        s: S,
+        bundle: &Bundle<W>,
+        boxes: &impl WideBoxes<S, W>,
+        t_bounds: S::V,
+        query: &mut Q,
+    ) -> bool {
+        query.watch().step();
+        let (mask, near) = if Q::ANY_BOXES {
+            boxes.entered::<true>(&bundle.walls, t_bounds)
+        } else {
+            boxes.entered::<false>(&bundle.walls, t_bounds)
+        };
+        if mask & mask.wrapping_sub(1) == 0 {
+            let only = bundle.refs.get(mask.trailing_zeros() as usize);
+            self.at = only.copied().unwrap_or_else(|| self.stack.pop());
+            return true;
+        }
+        if !self.stack.push(s, mask, near, &bundle.refs) {
+            return false;
+        }
+        self.at =
+            if Q::ORDERED { self.stack.pop_nearest::<S, W>(mask, near) } else { self.stack.pop() };
+        true
+    }
+
+    /// Offers `query` a leaf and goes on to what comes next; true when it ended the search.
+    #[inline(always)]
+    pub fn open<S: Simd, Q: Query>(
+        &mut self,
+        s: S,
+        leaves: &Leaves,
+        ray: &PreparedRay,
+        query: &mut Q,
+    ) -> bool {
+        if leaves.intersect_whole(s, self.at.leaf_block(), ray, query) {
+            return true;
+        }
+        if Q::ORDERED && query.t_bound() < self.t_bound {
+            self.t_bound = query.t_bound();
+            self.stack.cull(s, self.t_bound);
+        }
+        self.at = self.stack.pop();
+        false
+    }
+
+    /// Nothing beyond this `t` of the frame is visited any more.
+    #[inline(always)]
+    pub fn t_bound(&self) -> f32 {
+        self.t_bound
+    }
+}
+
+/// Offers `query` everything the ray meets, near bundles first; true when it ended the search.
 #[inline(always)]
 pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     s: S,
@@ -22,40 +110,20 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     query: &mut Q,
 ) -> bool {
     let boxes = slab.wide::<S, W>(s);
-    let mut stack = Stack::new();
-    let mut t_bound = query.t_bound();
-    let mut t_bounds = Width::<W>::splat(s, t_bound);
-    let mut at = ChildRef::bundle(0);
+    let mut walk = Walk::<ENOUGH_ROOM>::new(query.t_bound());
     loop {
-        while !at.is_leaf() {
-            let Some(bundle) = bundles.get(at.bundle_number()) else { return false };
-            query.watch().step();
-            let (mask, near) = if Q::ANY_BOXES {
-                boxes.entered::<true>(&bundle.walls, t_bounds)
-            } else {
-                boxes.entered::<false>(&bundle.walls, t_bounds)
-            };
-            if mask & mask.wrapping_sub(1) == 0 {
-                let only = bundle.refs.get(mask.trailing_zeros() as usize);
-                at = only.copied().unwrap_or_else(|| stack.pop());
-            } else if Q::ORDERED {
-                at = stack.push_and_take_nearest(s, mask, near, &bundle.refs);
-            } else {
-                stack.push(s, mask, near, &bundle.refs);
-                at = stack.pop();
+        let t_bounds = Width::<W>::splat(s, walk.t_bound());
+        while !walk.at().is_leaf() {
+            let Some(bundle) = bundles.get(walk.at().bundle_number()) else { return false };
+            if !walk.enter(s, bundle, &boxes, t_bounds, query) {
+                return false;
             }
         }
-        if at == ChildRef::NONE {
+        if walk.at() == ChildRef::NONE {
             return false;
         }
-        if leaves.intersect_whole(s, at.leaf_block(), ray, query) {
+        if walk.open(s, leaves, ray, query) {
             return true;
         }
-        if query.t_bound() < t_bound {
-            t_bound = query.t_bound();
-            t_bounds = Width::<W>::splat(s, t_bound);
-            stack.cull(s, t_bound);
-        }
-        at = stack.pop();
     }
 }

@@ -88,6 +88,18 @@ impl Leaves<'_> {
         self.intersect_block(s, kind, number, u32::MAX, ray, query)
     }
 
+    /// Has a block fetched that will be visited soon.
+    #[inline(always)]
+    pub fn prefetch<S: Simd>(&self, s: S, (kind, number): (u32, usize)) {
+        if kind == KIND_TRIANGLES {
+            if let Some(block) = self.triangle_blocks.get(number) {
+                s.prefetch(block);
+            }
+        } else if let Some(block) = self.sphere_blocks.get(number) {
+            s.prefetch(block);
+        }
+    }
+
     /// Offers `query` what the ray meets among those of `lanes` that are in use.
     #[inline(always)]
     fn intersect_block<S: Simd, Q: Query>(

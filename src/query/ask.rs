@@ -4,39 +4,50 @@ use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
 use crate::ray::PreparedRay;
 
 /// The closest hit: least `t`, and of equal ones the first primitive.
-pub(crate) struct Closest<'m, D: Decide, W> {
+///
+/// `MEMORY` is 1 to remember what comparisons of the best hit took, which ties make use of, or 0 to be small.
+pub(crate) struct Closest<'m, D: Decide, W, const MEMORY: usize> {
     filter: Filter<'m>,
     t_bound: f32,
     pub best: Option<D::Met>,
-    memory: D::Memory,
+    memory: [D::Memory; MEMORY],
     pub watch: W,
 }
 
-impl<'m, D: Decide, W: Watch> Closest<'m, D, W> {
+impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     #[inline(always)]
     pub fn new(filter: Filter<'m>, ray: &PreparedRay, watch: W) -> Self {
-        Closest { filter, t_bound: ray.t_max, best: None, memory: D::Memory::default(), watch }
+        Closest {
+            filter,
+            t_bound: ray.t_max,
+            best: None,
+            memory: core::array::from_fn(|_| D::Memory::default()),
+            watch,
+        }
     }
 
     #[inline(always)]
-    fn consider(&mut self, ray: &PreparedRay, met: &D::Met) {
+    fn consider(&mut self, ray: &PreparedRay, met: D::Met) {
         if !self.filter.faces(met.front()) {
             return;
         }
         if let Some(best) = &self.best {
             // The grid offers a primitive once for each cell that holds it.
             let known = met.place() == best.place() && met.root() == best.root();
-            let (prim_ids, memory) = (self.filter.prim_ids, &mut self.memory);
-            if known || !D::is_before(ray, met, best, prim_ids, memory, &mut self.watch) {
+            let (prim_ids, memory) = (self.filter.prim_ids, self.memory.first_mut());
+            if known || !D::is_before(ray, &met, best, prim_ids, memory, &mut self.watch) {
                 return;
             }
         }
-        self.best = Some(*met);
-        self.t_bound = self.t_bound.min(D::t_bound(ray, met));
+        self.best = Some(met);
+        let t_bound = D::t_bound(ray, &met);
+        if t_bound < self.t_bound {
+            self.t_bound = t_bound;
+        }
     }
 }
 
-impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
+impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMORY> {
     type Watch = W;
     const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = true;
@@ -59,14 +70,14 @@ impl<D: Decide, W: Watch> Query for Closest<'_, D, W> {
             && self.filter.sees(lane.place, true)
             && let Some(met) = D::triangle(ray, lane, &mut self.watch)
         {
-            self.consider(ray, &met);
+            self.consider(ray, met);
         }
         false
     }
 
     fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
         if self.filter.sees(lane.place, false) {
-            for met in D::sphere(ray, lane, &mut self.watch).iter().flatten() {
+            for met in D::sphere(ray, lane, &mut self.watch).into_iter().flatten() {
                 if self.filter.sees(lane.place, met.skippable()) {
                     self.consider(ray, met);
                 }

@@ -10,6 +10,7 @@ use crate::interval::{sphere, triangle};
 use crate::ray::{Interval, PreparedRay};
 
 /// Hit or miss, the primitive and the order of real arithmetic; `t` correctly rounded.
+#[derive(Clone, Copy)]
 pub(crate) struct Exact;
 
 /// A meeting, and an interval that holds its real `t`.
@@ -77,7 +78,7 @@ impl ExactMet {
     /// Whether the real `t` is within the ray's limits, in real arithmetic.
     #[cold]
     #[inline(never)]
-    fn is_within(&self, ray: &PreparedRay) -> bool {
+    fn is_within(self, ray: &PreparedRay) -> bool {
         Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
             t.compare_with(ray.given.t_min) != Ordering::Less
                 && t.compare_with(ray.given.t_max) != Ordering::Greater
@@ -88,11 +89,11 @@ impl ExactMet {
     #[cold]
     #[inline(never)]
     fn is_really_before(
-        &self,
+        self,
         ray: &PreparedRay,
         best: &ExactMet,
         prim_ids: &[u32],
-        memory: &mut ExactMemory,
+        memory: Option<&mut ExactMemory>,
         watch: &mut impl Watch,
     ) -> bool {
         let first = self.place.prim(prim_ids) < best.place.prim(prim_ids);
@@ -101,8 +102,14 @@ impl ExactMet {
             return first;
         }
         watch.exact();
-        let mine = Distance::new(&ray.line(), &self.meeting);
-        match mine.zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best)) {
+        let distance = |met: &ExactMet| Distance::new(&ray.line(), &met.meeting);
+        let order = match memory {
+            Some(memory) => {
+                distance(&self).zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best))
+            }
+            None => distance(&self).zip(distance(best)).map(|(mine, best)| mine.compare(&best)),
+        };
+        match order {
             Some(Ordering::Less) => true,
             Some(Ordering::Greater) => false,
             Some(Ordering::Equal) => first,
@@ -114,7 +121,7 @@ impl ExactMet {
     /// The nearest float to the real `t`, in real arithmetic.
     #[cold]
     #[inline(never)]
-    fn rounded(&self, ray: &PreparedRay) -> f32 {
+    fn rounded(self, ray: &PreparedRay) -> f32 {
         Distance::new(&ray.line(), &self.meeting).map_or(self.t as f32, |t| t.round())
     }
 }
@@ -203,7 +210,7 @@ impl Decide for Exact {
         met: &ExactMet,
         best: &ExactMet,
         prim_ids: &[u32],
-        memory: &mut ExactMemory,
+        memory: Option<&mut ExactMemory>,
         watch: &mut impl Watch,
     ) -> bool {
         let (a, b) = (met.interval(), best.interval());

@@ -156,7 +156,7 @@ pub(crate) trait Decide {
         met: &Self::Met,
         best: &Self::Met,
         prim_ids: &[u32],
-        memory: &mut Self::Memory,
+        memory: Option<&mut Self::Memory>,
         watch: &mut impl Watch,
     ) -> bool;
 

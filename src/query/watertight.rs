@@ -7,6 +7,7 @@ use crate::sieve;
 
 /// Nothing that the ray hits is missed: what the filter could not reject is met. Of two meetings
 /// the one with the smaller computed `t` comes first.
+#[derive(Clone, Copy)]
 pub(crate) struct Watertight;
 
 /// A meeting with its `t` in the frame.
@@ -91,7 +92,7 @@ impl Decide for Watertight {
         met: &WatertightMet,
         best: &WatertightMet,
         prim_ids: &[u32],
-        (): &mut (),
+        _: Option<&mut ()>,
         _: &mut impl Watch,
     ) -> bool {
         met.t < best.t || (met.t == best.t && met.place.prim(prim_ids) < best.place.prim(prim_ids))

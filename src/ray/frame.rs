@@ -157,12 +157,15 @@ impl Ray {
     }
 }
 
+/// The axes x, y and depth, for each depth.
+const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
 impl Shear {
     #[inline(always)]
     fn new(direction: &[f32; 4], inverse: &[f32; 4]) -> Self {
         let [x, y, z, _] = direction.map(|x| x.to_bits() & !(1 << 31));
         let depth = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][depth];
+        let axes = const { &AXES }[depth];
         let slope = [axes[0], axes[1]].map(|axis| direction[axis] * inverse[depth]);
         let depth_rate = direction[depth].abs();
         let [a, b] = slope.map(f32::abs);
@@ -177,6 +180,28 @@ impl Shear {
 }
 
 impl PreparedRay {
+    /// Nothing in particular.
+    pub const BLANK: Self = PreparedRay {
+        given: Ray::new([0.0; 3], [0.0; 3]),
+        scale: 0.0,
+        exponent: 0,
+        origin: [0.0; 4],
+        direction: [0.0; 4],
+        inverse: [0.0; 4],
+        reach: 0.0,
+        t_scale: 0.0,
+        t_min: 0.0,
+        t_max: 0.0,
+        t_inside: [0.0; 2],
+        shear: Shear {
+            axes: AXES[2],
+            slope: [0.0; 2],
+            steepness: 0.0,
+            depth_sign: 0.0,
+            depth_rate: 0.0,
+        },
+    };
+
     /// The line on which the ray lies.
     #[inline(always)]
     pub fn line(&self) -> Line {

@@ -43,6 +43,15 @@ pub(crate) struct NarrowSlab {
 }
 
 impl NarrowSlab {
+    /// Nothing in particular.
+    pub const BLANK: Self = NarrowSlab {
+        reciprocal: [0.0; 4],
+        near_shift: [0.0; 4],
+        far_shift: [0.0; 4],
+        t_min: 0.0,
+        backwards: [false; 3],
+    };
+
     /// The ray for boxes, if its frame is neither too small nor too large for them.
     #[inline(always)]
     pub fn new<S: Width<4>>(s: S, ray: &PreparedRay) -> Option<Self> {

@@ -95,6 +95,10 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
         unsafe { scalar::keep_up_to(near, refs, t_bound) }
     }
 
+    /// Lets the processor fetch `what`, which will be read soon.
+    #[inline(always)]
+    fn prefetch<T>(self, _what: &T) {}
+
     /// Runs `kernel` with the backend's instructions; all that it inlines may use them.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
 }

@@ -509,8 +509,23 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
+    fn prefetch<T>(self, what: &T) {
+        prefetch(what);
+    }
+
+    #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)
+    }
+}
+
+/// Asks for each cache line of `what`.
+#[inline(always)]
+fn prefetch<T>(what: &T) {
+    let first = core::ptr::from_ref(what).cast::<i8>();
+    for line in (0..size_of::<T>()).step_by(64) {
+        // SAFETY: SSE is part of x86-64, and a prefetch reads nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(line)) };
     }
 }
 
@@ -547,6 +562,11 @@ impl Simd for Avx2 {
             let high = _mm256_srlv_epi32(all, _mm256_add_epi32(shifts, _mm256_set1_epi32(16)));
             Two(pick(table, low), pick(table, high))
         }
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(self, what: &T) {
+        prefetch(what);
     }
 
     #[inline(always)]
@@ -605,6 +625,11 @@ impl Simd for Avx512 {
             from += 16;
         }
         kept
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(self, what: &T) {
+        prefetch(what);
     }
 
     #[inline(always)]
