@@ -24,9 +24,11 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd"]),
     ("bvh", &["block", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"]),
     ("surface", &["interval", "math", "ray"]),
+    ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
+    ("batch", &["block", "bvh", "prim", "query", "ray", "simd", "trace"]),
     (
         "accel",
-        &["block", "bvh", "error", "grid", "prim", "query", "ray", "simd", "storage", "surface"],
+        &["batch", "block", "bvh", "error", "grid", "prim", "query", "ray", "surface", "trace"],
     ),
     ("build", &["accel", "block", "bvh", "error", "grid", "list", "prim", "scene", "storage"]),
     ("owned", &["accel", "build", "error", "scene", "storage"]),

@@ -155,11 +155,10 @@ pub unsafe extern "C" fn rt_intersect_batch_with(
     hit_stride: usize,
     count: usize,
 ) -> RtStatus {
-    let ask = |accel: &Accel, ray: &Ray, options: &QueryOptions| {
-        accel.intersect_with(ray, options).unwrap_or(Hit::MISS).into()
-    };
+    let out = (hits, hit_stride);
+    let ask = Accel::intersect_batch_with;
     // SAFETY: the caller's promise.
-    guard(|| unsafe { batch(accel, (rays, ray_stride), query, (hits, hit_stride), count, ask) })
+    guard(|| unsafe { batch(accel, (rays, ray_stride), query, out, count, (Hit::MISS, ask)) })
 }
 
 /// `rt_occluded_with` for `count` rays, `ray_stride` bytes apart, into bytes `occluded_stride` bytes
@@ -179,12 +178,10 @@ pub unsafe extern "C" fn rt_occluded_batch_with(
     occluded_stride: usize,
     count: usize,
 ) -> RtStatus {
-    let ask = |accel: &Accel, ray: &Ray, options: &QueryOptions| {
-        u8::from(accel.occluded_with(ray, options))
-    };
     let out = (occluded, occluded_stride);
+    let ask = Accel::occluded_batch_with;
     // SAFETY: the caller's promise.
-    guard(|| unsafe { batch(accel, (rays, ray_stride), query, out, count, ask) })
+    guard(|| unsafe { batch(accel, (rays, ray_stride), query, out, count, (false, ask)) })
 }
 
 /// Writes to `*out` the surface at a hit that a query on this accel returned for this ray.
@@ -215,18 +212,24 @@ pub unsafe extern "C" fn rt_hit_surface(
     })
 }
 
+/// So many rays are read, asked for together and answered before the next.
+const PART: usize = 128;
+
+/// How the rays of a batch are asked for together, and what stands for no answer yet.
+type AskTogether<'m, A> = (A, fn(&Accel<'m>, &[Ray], &QueryOptions, &mut [A]));
+
 /// Asks for each of `count` rays and writes the answers; arrays come with their strides.
 ///
 /// # Safety
 ///
 /// Every pointer is null or valid for `count` elements, and nobody else uses `out` during the call.
-unsafe fn batch<T>(
+unsafe fn batch<'m, A: Copy + Into<T>, T>(
     accel: *const RtAccel,
     rays: (*const RtRay, usize),
     query: *const RtQuery,
     out: (*mut T, usize),
     count: usize,
-    ask: impl Fn(&Accel, &Ray, &QueryOptions) -> T,
+    (none, ask): AskTogether<'m, A>,
 ) -> Result<(), Error> {
     // SAFETY: the caller's promise.
     let accel = unsafe { accel_at(accel) }?;
@@ -234,12 +237,19 @@ unsafe fn batch<T>(
     let options = unsafe { query_options(query) }?;
     let rays = Column::new(rays.0, rays.1, count)?;
     let out = Column::new(out.0.cast_const(), out.1, count)?;
-    for i in 0..count {
-        // SAFETY: below `count`, and valid as the caller promises.
-        let ray = unsafe { rays.at(i).read() }.into();
-        let answer = ask(&accel, &ray, &options);
-        // SAFETY: as above; C passed this pointer as one to write to.
-        unsafe { out.at(i).cast_mut().write(answer) };
+    let mut part = [Ray::new([0.0; 3], [0.0; 3]); PART];
+    let mut answers = [none; PART];
+    for first in (0..count).step_by(PART) {
+        let size = PART.min(count - first);
+        for (i, ray) in part[..size].iter_mut().enumerate() {
+            // SAFETY: below `count`, and valid as the caller promises.
+            *ray = unsafe { rays.at(first + i).read() }.into();
+        }
+        ask(&accel, &part[..size], &options, &mut answers[..size]);
+        for (i, answer) in answers[..size].iter().enumerate() {
+            // SAFETY: as above; C passed this pointer as one to write to.
+            unsafe { out.at(first + i).cast_mut().write((*answer).into()) };
+        }
     }
     Ok(())
 }
