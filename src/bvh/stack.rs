@@ -42,7 +42,7 @@ impl<const ROOM: usize> Stack<ROOM> {
 
     /// Pushes the children in the lanes of `mask`, in their order; false when there is no room.
     #[inline(always)]
-    pub fn push<S: Width<W>, const W: usize>(
+    fn push<S: Width<W>, const W: usize>(
         &mut self,
         s: S,
         mask: u32,
@@ -70,17 +70,28 @@ impl<const ROOM: usize> Stack<ROOM> {
         true
     }
 
-    /// Takes the nearest, or nearly so, of the children in the lanes of `mask`, which were pushed last.
+    /// Pushes the children in the lanes of `mask` but the nearest, or nearly so, which it returns; `None` when
+    /// there is no room.
     #[inline(always)]
-    pub fn pop_nearest<S: Width<W>, const W: usize>(&mut self, mask: u32, near: S::V) -> ChildRef {
-        let pushed = mask.count_ones() as usize;
-        let Some(first) = self.count.checked_sub(pushed.max(1)) else { return ChildRef::NONE };
-        let (nearest, last) = (first + near.least_of(mask).min(pushed - 1), self.count - 1);
-        let taken = self.reference(nearest);
-        self.near[nearest] = self.near[last];
-        self.refs[nearest] = self.refs[last];
+    pub fn push_but_nearest<S: Width<W>, const W: usize>(
+        &mut self,
+        s: S,
+        mask: u32,
+        near: S::V,
+        refs: &[ChildRef; W],
+    ) -> Option<ChildRef> {
+        let first = self.count;
+        if !self.push(s, mask, near, refs) {
+            return None;
+        }
+        let (number, nearest) = s.nearest(mask, near, ChildRef::words(refs));
+        // Its place goes to the last one.
+        let last = self.count.checked_sub(1)?;
+        let place = (first + number).min(last);
+        self.near[place] = self.near[last];
+        self.refs[place] = self.refs[last];
         self.count = last;
-        ChildRef(taken)
+        Some(ChildRef(nearest))
     }
 
     /// Drops what the ray enters beyond `t_bound`.

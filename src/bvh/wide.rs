@@ -64,12 +64,15 @@ impl<const ROOM: usize> Walk<ROOM> {
             self.at = only.copied().unwrap_or_else(|| self.stack.pop());
             return true;
         }
-        if !self.stack.push(s, mask, near, &bundle.refs) {
-            return false;
+        if Q::ORDERED {
+            let nearest = self.stack.push_but_nearest(s, mask, near, &bundle.refs);
+            self.at = nearest.unwrap_or(ChildRef::NONE);
+            return nearest.is_some();
         }
-        self.at =
-            if Q::ORDERED { self.stack.pop_nearest::<S, W>(mask, near) } else { self.stack.pop() };
-        true
+        // Without a bound that moves, it does not matter where they are entered.
+        let pushed = self.stack.push_refs(s, mask, &bundle.refs);
+        self.at = self.stack.pop();
+        pushed
     }
 
     /// Offers `query` a leaf and goes on to what comes next; true when it ended the search.

@@ -65,7 +65,6 @@ impl Feature {
 /// computed again without error.
 ///
 /// Source: \[DEG12\]; the filter after \[She97\].
-#[inline(never)]
 pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let [u, v, w] = volumes(line, triangle);
     let (least, most) = (u.min(v).min(w), u.max(v).max(w));
@@ -125,8 +124,13 @@ pub(crate) fn weights(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 2] {
 
 /// The meeting of the line with the triangle's plane: all that is left to ask for a line that surely
 /// passes between the edges. `None` when it is parallel.
-#[inline(always)]
 pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
+    clear_plane(line, triangle).or_else(|| exact_plane(line, triangle))
+}
+
+/// The same, or `None` where the plane is nearly parallel to the line.
+#[inline(always)]
+pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let [a, b, c] = triangle.map(wide);
     let d = wide(line.direction);
     let (e1, e2) = (b - a, c - a);
@@ -137,7 +141,7 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
     let size = gamma(8) * sum_abs(e1) * sum_abs(e2);
     let along_error = sum_abs(d) * size;
     if !(1024.0 * along_error < along.abs()) {
-        return exact_plane(line, triangle);
+        return None;
     }
     let inverse = 1.0 / along;
     let t = to_plane.dot(n) * inverse;
@@ -147,9 +151,7 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
     Some(TriangleMeeting { t, t_error, front: along < 0.0, exact: false, feature: Feature::Face })
 }
 
-/// The same where the plane is nearly parallel to the line, without error.
-#[cold]
-#[inline(never)]
+/// The meeting with the plane, without error.
 fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
     let (t, t_error) = distance.approximate();

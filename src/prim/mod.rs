@@ -147,22 +147,24 @@ impl Leaves<'_> {
         if Q::ANY_BOXES && in_doubt > 2 && !is_near(ray, block, t_bound) {
             return false;
         }
-        for lane in Lanes(found.candidates) {
-            let corners = block.triangle(lane);
-            // What was found in a lane before may already be nearer.
-            let bound = query.t_bound();
-            if bound < t_bound && !sieve::is_candidate(ray, bound, corners) {
-                continue;
-            }
-            let has = |mask: u32| mask >> lane & 1 == 1;
-            let lane = TriangleLane {
-                corners,
-                place: place(number, block.first, lane),
-                sure: has(found.sure),
-                inside: has(found.inside),
-            };
-            if query.triangle(ray, &lane) {
+        let lane = |lane: u32| TriangleLane {
+            block,
+            place: place(number, block.first, lane as usize),
+            sure: found.sure >> lane & 1 == 1,
+            inside: found.inside >> lane & 1 == 1,
+        };
+        if found.candidates.is_power_of_two() {
+            return query.triangle(ray, &lane(found.candidates.trailing_zeros()));
+        }
+        let mut rest = found.candidates;
+        while let Some(next) = found.nearest(rest) {
+            rest &= !(1 << next);
+            if query.triangle(ray, &lane(next)) {
                 return true;
+            }
+            // What was found in a lane may be nearer than others.
+            if query.t_bound() < t_bound {
+                rest &= found.up_to(ray, query.t_bound());
             }
         }
         false

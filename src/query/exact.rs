@@ -5,7 +5,7 @@ use core::cmp::Ordering;
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
 use crate::block::leaf::Place;
 use crate::exact::{Distance, Meeting};
-use crate::interval::triangle::Feature;
+use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
 use crate::ray::{Interval, PreparedRay};
 
@@ -156,19 +156,24 @@ impl Decide for Exact {
         watch: &mut impl Watch,
     ) -> Option<ExactMet> {
         watch.interval();
-        let line = ray.line();
-        let meeting = if lane.sure {
-            triangle::plane(&line, lane.corners)
-        } else {
-            triangle::meet(&line, lane.corners)
-        }?;
-        if meeting.exact {
-            watch.exact();
-        }
+        let meeting = match lane.sure {
+            true => triangle::clear_plane(&ray.line(), lane.corners()),
+            false => None,
+        };
+        let meeting = match meeting {
+            Some(meeting) => meeting,
+            None => {
+                let meeting = unclear(ray, *lane)?;
+                if meeting.exact {
+                    watch.exact();
+                }
+                meeting
+            }
+        };
         let met = ExactMet {
             t: meeting.t,
             t_error: meeting.t_error,
-            meeting: Meeting::Triangle(lane.corners),
+            meeting: Meeting::Triangle(lane.corners()),
             feature: meeting.feature,
             place: lane.place,
             front: meeting.front,
@@ -229,8 +234,8 @@ impl Decide for Exact {
         // and doubled surfaces.
         !lane.sure
             && best.place.prim(prim_ids) < lane.place.prim(prim_ids)
-            && (best.feature.is_part_of(&lane.corners)
-                || best.meeting.surely_equal(&Meeting::Triangle(lane.corners)))
+            && (best.feature.is_part_of(&lane.corners())
+                || best.meeting.surely_equal(&Meeting::Triangle(lane.corners())))
     }
 
     #[inline(always)]
@@ -260,6 +265,15 @@ impl Decide for Exact {
             }
             Meeting::Sphere { .. } => [0.0; 2],
         }
+    }
+}
+
+/// The meeting with a triangle whose edges the line passes closely, or whose plane it hardly crosses.
+#[inline(never)]
+fn unclear(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
+    match lane.sure {
+        true => triangle::plane(&ray.line(), lane.corners()),
+        false => triangle::meet(&ray.line(), lane.corners()),
     }
 }
 

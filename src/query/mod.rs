@@ -15,7 +15,7 @@ pub use options::{Facing, Precision, PrimId, QueryOptions};
 pub(crate) use options::{Filter, flat_number, geometry_of};
 pub(crate) use watertight::Watertight;
 
-use crate::block::leaf::Place;
+use crate::block::leaf::{Place, TriangleBlock};
 use crate::ray::PreparedRay;
 use crate::sieve::SphereDetail;
 
@@ -81,15 +81,24 @@ impl Watch for &mut Counts {
 }
 
 /// A triangle that the filter could not reject.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TriangleLane {
-    pub corners: [[f32; 3]; 3],
+#[derive(Clone, Copy)]
+pub(crate) struct TriangleLane<'b> {
+    pub block: &'b TriangleBlock,
     /// Where it is stored. Its number is farther away, and looked up only where it matters.
     pub place: Place,
     /// The ray's line passes between the edges: this is no longer in doubt.
     pub sure: bool,
     /// And the real `t` is within the ray's limits.
     pub inside: bool,
+}
+
+impl TriangleLane<'_> {
+    /// Its vertices. Not kept: an array that anything out of line could see would have to be in memory, and what
+    /// is written to memory by parts is slow to read as a whole.
+    #[inline(always)]
+    pub fn corners(&self) -> [[f32; 3]; 3] {
+        self.block.triangle(self.place.lane as usize)
+    }
 }
 
 /// A sphere that the filter could not reject.

@@ -49,7 +49,7 @@ impl Decide for Watertight {
         lane: &TriangleLane,
         _: &mut impl Watch,
     ) -> Option<WatertightMet> {
-        let detail = sieve::detail(ray, lane.corners);
+        let detail = sieve::detail(ray, lane.corners());
         if detail.t + detail.t_error < ray.t_min || detail.t - detail.t_error > ray.t_max {
             return None;
         }

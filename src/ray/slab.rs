@@ -126,17 +126,37 @@ struct NarrowBoxes<S, V> {
 impl<S: Width<N>, const N: usize> WideBoxes<S, N> for NarrowBoxes<S, S::V> {
     #[inline(always)]
     fn entered<const FUSED: bool>(&self, walls: &[[f32; N]; 6], t_bound: S::V) -> (u32, S::V) {
-        let (mut near, mut far) = (self.t_min, t_bound);
-        for k in 0..3 {
-            let (lower, upper) = (&walls[k], &walls[k + 3]);
-            let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
-            let r = self.reciprocal[k];
-            let enter = mul_sub::<_, FUSED, N>(self.s.load(first), r, self.near_shift[k]);
-            let leave = mul_sub::<_, FUSED, N>(self.s.load(last), r, self.far_shift[k]);
-            near = enter.max(near);
-            far = leave.min(far);
-        }
+        let [x, y, z] = [
+            self.between::<FUSED, N>(walls, 0),
+            self.between::<FUSED, N>(walls, 1),
+            self.between::<FUSED, N>(walls, 2),
+        ];
+        // In pairs, so that they wait less for each other.
+        let near = x.near.max(y.near).max(z.near.max(self.t_min));
+        let far = x.far.min(y.far).min(z.far.min(t_bound));
         (near.less_or_equal(far), near)
+    }
+}
+
+impl<S, V: Copy> NarrowBoxes<S, V> {
+    /// The parts between the two walls across an axis.
+    #[inline(always)]
+    fn between<const FUSED: bool, const N: usize>(
+        &self,
+        walls: &[[f32; N]; 6],
+        k: usize,
+    ) -> Interval<V>
+    where
+        S: Width<N, V = V>,
+        V: Lanes<N>,
+    {
+        let (lower, upper) = (&walls[k], &walls[k + 3]);
+        let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
+        let r = self.reciprocal[k];
+        Interval {
+            near: mul_sub::<V, FUSED, N>(self.s.load(first), r, self.near_shift[k]),
+            far: mul_sub::<V, FUSED, N>(self.s.load(last), r, self.far_shift[k]),
+        }
     }
 }
 

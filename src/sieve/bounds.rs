@@ -165,6 +165,9 @@ fn see_triangle(
     let error = rise_error(unsure, to_q.abs().max(to_r.abs()), p.depth, total.abs());
     let off = f64::from(rise) - (depth - f64::from(p.depth)) * f64::from(total.abs());
     worst.rise.see(off, f64::from(error));
+    // Above it by no more than twice the error; NaN says nothing. 2^-90: what is granted at least.
+    let above = depth - f64::from(sieved.least_depth) + 2f64.powi(-90);
+    assert!(!(above < 0.0), "{} {depth}", sieved.least_depth);
     if sieved.sure {
         let off = (f64::from(sieved.detail.t) * f64::from(ray.shear.depth_rate) - depth).abs();
         let granted = f64::from(error) / f64::from(total.abs());

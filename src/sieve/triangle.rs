@@ -201,6 +201,8 @@ struct Meetings<V> {
     total: V,
     /// The depth of the meeting, from that of the first vertex, times the size of `total`.
     rise: V,
+    /// What it may be off, even if the total has the wrong sign.
+    error: V,
     nearest_depth: V,
     farthest_depth: V,
 }
@@ -241,14 +243,28 @@ impl<V: Copy> Meetings<V> {
             inside: error.less(inside_low) & inside_high.less(minus_error),
             total,
             rise,
+            error,
             nearest_depth,
             farthest_depth,
         }
     }
+
+    /// What the depth of the meeting is surely not below, by the depth of the first vertex. NaN, or minus
+    /// infinity, where the total is zero.
+    #[inline(always)]
+    fn least_depth<S: Width<N, V = V>, const N: usize>(&self, s: S, first_depth: V) -> V
+    where
+        V: Lanes<N>,
+    {
+        let above_first = self.rise.sub(self.error).div(self.total.abs());
+        // Three roundings.
+        let slack = first_depth.abs().add(above_first.abs()).mul(s.splat(4.0 * UNIT32));
+        first_depth.add(above_first).sub(slack)
+    }
 }
 
 /// What is left of a block, one bit a lane.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Triangles {
     /// Lanes that the filter could not reject.
     pub candidates: u32,
@@ -256,6 +272,36 @@ pub(crate) struct Triangles {
     pub sure: u32,
     /// Those of them whose real `t` surely is within the ray's limits.
     pub inside: u32,
+    /// What the depth of the meeting in each candidate is surely not below; NaN where this is not known.
+    least_depths: [f32; 16],
+}
+
+impl Triangles {
+    const NONE: Self =
+        Triangles { candidates: 0, sure: 0, inside: 0, least_depths: [f32::NAN; 16] };
+
+    /// The lane of `lanes` whose meeting may come first; those of which it is not known, before.
+    #[inline(always)]
+    pub fn nearest(&self, lanes: u32) -> Option<u32> {
+        let (mut rest, mut nearest, mut least) = (lanes, None, f32::INFINITY);
+        while rest != 0 {
+            let lane = rest.trailing_zeros();
+            rest &= rest - 1;
+            let depth = self.least_depths[lane as usize % 16];
+            if nearest.is_none() || !(depth >= least) {
+                (nearest, least) = (Some(lane), depth);
+            }
+        }
+        nearest
+    }
+
+    /// The lanes whose meeting may come up to `t_bound`.
+    #[inline(always)]
+    pub fn up_to(&self, ray: &PreparedRay, t_bound: f32) -> u32 {
+        let high = Depths::new(ray, t_bound).high;
+        let beyond = |(lane, depth): (usize, &f32)| u32::from(*depth > high) << lane;
+        !self.least_depths.iter().enumerate().map(beyond).fold(0, |all, lane| all | lane)
+    }
 }
 
 /// So many candidates are decided one by one, without looking at their depths together first.
@@ -289,15 +335,22 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     let areas = Areas::new::<S, FREE, 16>(s, &error, &corners);
     let candidates = lanes & !areas.outside(s);
     if candidates == 0 {
-        return Triangles { candidates: 0, sure: 0, inside: 0 };
+        return Triangles::NONE;
     }
     let sure = candidates & areas.sure(s);
     if FREE && candidates.count_ones() <= DIRECT {
-        return Triangles { candidates, sure, inside: 0 };
+        return Triangles { candidates, sure, ..Triangles::NONE };
     }
     let meetings = Meetings::new(s, &Depths::new(ray, t_bound), &areas, &corners);
     let candidates = candidates & !meetings.past;
-    Triangles { candidates, sure, inside: sure & meetings.inside }
+    let mut found = Triangles {
+        candidates,
+        sure: sure & candidates,
+        inside: sure & candidates & meetings.inside,
+        ..Triangles::NONE
+    };
+    meetings.least_depth(s, corners[0].depth).store(&mut found.least_depths);
+    found
 }
 
 /// The corners of all triangles of a block, out of its vertices.
@@ -335,21 +388,21 @@ fn few(
     lanes: u32,
 ) -> Triangles {
     let depths = Depths::new(ray, t_bound);
-    let mut found = Triangles { candidates: 0, sure: 0, inside: 0 };
+    let mut found = Triangles::NONE;
     let mut rest = lanes;
     while rest != 0 {
         let lane = rest.trailing_zeros();
         rest &= rest - 1;
         let one = One::new(ray, &depths, error, block.triangle(lane as usize));
-        found.candidates |= u32::from(!one.is_rejected()) << lane;
-        found.sure |= u32::from(one.is_sure()) << lane;
-        found.inside |= u32::from(one.is_inside()) << lane;
+        if !one.is_rejected() {
+            found.candidates |= 1 << lane;
+            found.sure |= u32::from(one.is_sure()) << lane;
+            found.inside |= u32::from(one.is_inside()) << lane;
+            [found.least_depths[lane as usize % 16]] =
+                one.meetings.least_depth(Scalar, [one.first_depth]);
+        }
     }
-    Triangles {
-        candidates: found.candidates,
-        sure: found.sure & found.candidates,
-        inside: found.inside & found.candidates,
-    }
+    found
 }
 
 /// The filter for one triangle.
@@ -389,11 +442,6 @@ impl One {
 
 fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared<[f32; 1]> {
     Sheared::new::<Scalar, false, 1>(Scalar, ray, &vertex.map(|x| [x]))
-}
-
-/// Whether the filter cannot reject this triangle.
-pub(crate) fn is_candidate(ray: &PreparedRay, t_bound: f32, corners: [[f32; 3]; 3]) -> bool {
-    !One::alone(ray, &Depths::new(ray, t_bound), corners).is_rejected()
 }
 
 /// One triangle in `f32`.
@@ -497,6 +545,7 @@ pub(super) mod single {
     pub struct Sieved {
         pub sure: bool,
         pub inside: bool,
+        pub least_depth: f32,
         pub detail: TriangleDetail,
     }
 
@@ -505,6 +554,7 @@ pub(super) mod single {
         (!one.is_rejected()).then(|| Sieved {
             sure: one.is_sure(),
             inside: one.is_inside(),
+            least_depth: one.meetings.least_depth(Scalar, [one.first_depth])[0],
             detail: super::detail(ray, corners),
         })
     }

@@ -43,15 +43,6 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn store(self, out: &mut [f32; N]);
     /// Writes the lanes of `mask` in order to the front of `out`, and anything behind them.
     fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]);
-
-    /// Of the lanes of `mask`, counted from the lowest, the number of one that is nearly the least: of the
-    /// first whose bits are, as an integer, with their number in place of the lowest ones.
-    #[inline(always)]
-    fn least_of(self, mask: u32) -> usize {
-        let mut lanes = [0.0; N];
-        self.store(&mut lanes);
-        scalar::least_of(&lanes, mask)
-    }
 }
 
 /// `a * b - c`, fused where that is faster if `FUSED` says that the bits need not be those of others.
@@ -67,6 +58,15 @@ pub(crate) trait Width<const N: usize>: Copy {
     fn load(self, lanes: &[f32; N]) -> Self::V;
     /// Writes the words of `mask` in order to the front of `out`, and anything behind them.
     fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]);
+
+    /// Of the lanes of `mask`, counted from the lowest, the number of one in which `near` is nearly least, and
+    /// its word: the first of the least as integers, when their number replaces the lowest bits.
+    #[inline(always)]
+    fn nearest(self, mask: u32, near: Self::V, words: &[u32; N]) -> (usize, u32) {
+        let mut lanes = [0.0; N];
+        near.store(&mut lanes);
+        scalar::nearest(mask, &lanes, words)
+    }
 }
 
 /// A backend: a proof that its instructions exist.

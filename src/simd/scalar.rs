@@ -30,19 +30,25 @@ pub(super) fn compress<T: Copy, const N: usize>(
     }
 }
 
-/// See [`Lanes::least_of`].
+/// See [`Width::nearest`].
 #[inline(always)]
-pub(super) fn least_of<const N: usize>(lanes: &[f32; N], mask: u32) -> usize {
+pub(super) fn nearest<const N: usize>(
+    mask: u32,
+    near: &[f32; N],
+    words: &[u32; N],
+) -> (usize, u32) {
     // Two bits for the number of up to four lanes.
     let numbers = if mask.count_ones() <= 4 { 3 } else { 15 };
-    let (mut rest, mut number, mut least) = (mask, 0, i32::MAX);
-    while let Some(lane) = lanes.get(rest.trailing_zeros() as usize) {
-        let key = lane.to_bits() as i32 & !numbers | number;
-        least = if key < least { key } else { least };
+    let (mut rest, mut number, mut least, mut nearest) = (mask, 0, i32::MAX, (0, u32::MAX));
+    while let Some(t) = near.get(rest.trailing_zeros() as usize) {
+        let key = t.to_bits() as i32 & !numbers | number;
+        if key < least {
+            (least, nearest) = (key, (number as usize, words[rest.trailing_zeros() as usize]));
+        }
         number += 1;
         rest &= rest - 1;
     }
-    (least & numbers) as usize
+    nearest
 }
 
 /// See [`Simd::keep_up_to`].

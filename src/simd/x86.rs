@@ -299,31 +299,6 @@ impl Lanes<16> for F16 {
             _mm512_storeu_ps(out.as_mut_ptr().cast(), front);
         }
     }
-
-    #[inline(always)]
-    fn least_of(self, mask: u32) -> usize {
-        const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-        // SAFETY: a value of this type proves AVX-512; the table has 16 words.
-        unsafe {
-            let above = _mm512_set1_epi32(i32::MAX);
-            let keys =
-                _mm512_mask_compress_epi32(above, mask as __mmask16, _mm512_castps_si512(self.0));
-            let numbers = _mm512_loadu_si512(NUMBERS.as_ptr().cast());
-            if mask.count_ones() > 4 {
-                let keys =
-                    _mm512_or_si512(_mm512_andnot_si512(_mm512_set1_epi32(15), keys), numbers);
-                return _mm512_reduce_min_epi32(keys) as usize & 15;
-            }
-            let keys = _mm512_castsi512_si128(keys);
-            let keys = _mm_or_si128(
-                _mm_andnot_si128(_mm_set1_epi32(3), keys),
-                _mm512_castsi512_si128(numbers),
-            );
-            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0x4E>(keys));
-            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0xB1>(keys));
-            _mm_cvtsi128_si32(keys) as usize & 3
-        }
-    }
 }
 
 macro_rules! both {
@@ -385,7 +360,7 @@ fn halves<const N: usize, const HALF: usize>(lanes: &[f32; N]) -> [&[f32; HALF];
 }
 
 macro_rules! width {
-    ($backend:ident $n:literal $v:ident $splat:ident $load:ident) => {
+    ($backend:ident $n:literal $v:ident $splat:ident $load:ident $($more:item)*) => {
         impl Width<$n> for $backend {
             type V = $v;
 
@@ -410,6 +385,8 @@ macro_rules! width {
             ) {
                 self.compress_all(mask, words, out);
             }
+
+            $($more)*
         }
     };
 }
@@ -453,7 +430,33 @@ width!(Avx2 8 F8 _mm256_set1_ps _mm256_loadu_ps);
 doubled!(Avx2 16 of 8 F8);
 width!(Avx512 4 F4 _mm_set1_ps _mm_loadu_ps);
 width!(Avx512 8 F8 _mm256_set1_ps _mm256_loadu_ps);
-width!(Avx512 16 F16 _mm512_set1_ps _mm512_loadu_ps);
+width!(Avx512 16 F16 _mm512_set1_ps _mm512_loadu_ps
+    #[inline(always)]
+    fn nearest(self, mask: u32, near: F16, words: &[u32; 16]) -> (usize, u32) {
+        const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+        // SAFETY: the token proves AVX-512; both tables have 16 words.
+        unsafe {
+            let (mask, above) = (mask as __mmask16, _mm512_set1_epi32(i32::MAX));
+            let keys = _mm512_mask_compress_epi32(above, mask, _mm512_castps_si512(near.0));
+            let words = _mm512_maskz_compress_epi32(mask, _mm512_loadu_si512(words.as_ptr().cast()));
+            let numbers = _mm512_loadu_si512(NUMBERS.as_ptr().cast());
+            if mask.count_ones() > 4 {
+                let keys = _mm512_andnot_si512(_mm512_set1_epi32(15), keys);
+                let key = _mm512_reduce_min_epi32(_mm512_or_si512(keys, numbers));
+                let word = _mm512_permutexvar_epi32(_mm512_set1_epi32(key), words);
+                return (key as usize & 15, _mm_cvtsi128_si32(_mm512_castsi512_si128(word)) as u32);
+            }
+            let keys = _mm_andnot_si128(_mm_set1_epi32(3), _mm512_castsi512_si128(keys));
+            let keys = _mm_or_si128(keys, _mm512_castsi512_si128(numbers));
+            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0x4E>(keys));
+            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0xB1>(keys));
+            let words = _mm_castsi128_ps(_mm512_castsi512_si128(words));
+            // This looks at the two lowest bits only.
+            let word = _mm_castps_si128(_mm_permutevar_ps(words, keys));
+            (_mm_cvtsi128_si32(keys) as usize & 3, _mm_cvtsi128_si32(word) as u32)
+        }
+    }
+);
 
 /// How a backend compresses words: one after the other unless it says otherwise.
 trait CompressWords: Copy {
