@@ -95,8 +95,9 @@ pub fn build_grid<'m>(
     Job::new(scene, options, Structure::Grid)?.run(memory)
 }
 
+/// What a build makes of a scene.
 #[derive(Clone, Copy, PartialEq)]
-enum Structure {
+pub(crate) enum Structure {
     List,
     Grid,
     Bvh,
@@ -105,23 +106,23 @@ enum Structure {
 }
 
 /// A build that was checked and sized, but not begun.
-struct Job<'s, 'a> {
+pub(crate) struct Job<'s, 'a> {
     scene: &'s Scene<'a>,
     survey: Survey,
     census: Census,
     structure: Structure,
-    memory: Memory,
+    pub memory: Memory,
 }
 
 impl<'s, 'a> Job<'s, 'a> {
-    fn new(
+    pub fn new(
         scene: &'s Scene<'a>,
         options: &BuildOptions,
         asked: Structure,
     ) -> Result<Self, BuildError> {
         options.check()?;
         let survey = survey(scene)?;
-        let census = Census::take(scene, &survey);
+        let census = Census::take(scene, &survey)?;
         let handful = match options.plain_list {
             PlainList::Automatic => list::HANDFUL,
             PlainList::Never => 0,
@@ -138,7 +139,7 @@ impl<'s, 'a> Job<'s, 'a> {
         Ok(Job { scene, survey, census, structure, memory })
     }
 
-    fn run<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
+    pub fn run<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
         let Memory { size, minimum, alignment } = self.memory;
         if !memory.as_ptr().addr().is_multiple_of(alignment) {
             return Err(BuildError::Misaligned);
@@ -176,7 +177,7 @@ impl BuildOptions {
     }
 
     /// The structure of a BVH with this layout.
-    fn bvh(&self) -> Structure {
+    pub(crate) fn bvh(&self) -> Structure {
         match self.layout {
             Layout::Automatic => Structure::Wide(16),
             Layout::Compact => Structure::Bvh,

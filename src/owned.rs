@@ -1,7 +1,7 @@
 //! A built structure in memory of its own: the outer shell, and the only place that allocates.
 
 use crate::accel::Accel;
-use crate::build::{BuildOptions, Memory, build_bvh, build_grid, bvh_needs, grid_needs};
+use crate::build::{BuildOptions, Job, Structure};
 use crate::error::BuildError;
 use crate::scene::Scene;
 use crate::storage::AlignedMemory;
@@ -15,23 +15,26 @@ pub struct OwnedAccel {
 }
 
 impl OwnedAccel {
-    /// Builds a BVH; see [`build_bvh`].
+    /// Builds a BVH; see [`build_bvh`](crate::build_bvh).
     pub fn bvh(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
-        let Memory { size, .. } = bvh_needs(scene, options)?;
-        let mut memory = allocate(size)?;
-        let used = build_bvh(scene, options, memory.uninit())?.block().len();
-        Self::keep(memory, used)
+        Self::build(scene, options, options.bvh())
     }
 
-    /// Builds a grid; see [`build_grid`].
+    /// Builds a grid; see [`build_grid`](crate::build_grid).
     pub fn grid(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
-        let Memory { size, .. } = grid_needs(scene, options)?;
-        let mut memory = allocate(size)?;
-        let used = build_grid(scene, options, memory.uninit())?.block().len();
-        Self::keep(memory, used)
+        Self::build(scene, options, Structure::Grid)
     }
 
-    fn keep(memory: AlignedMemory, used: usize) -> Result<Self, BuildError> {
+    fn build(
+        scene: &Scene,
+        options: &BuildOptions,
+        structure: Structure,
+    ) -> Result<Self, BuildError> {
+        let job = Job::new(scene, options, structure)?;
+        let size = job.memory.size;
+        let memory = AlignedMemory::new(size);
+        let mut memory = memory.ok_or(BuildError::OutOfMemory { minimum: size })?;
+        let used = job.run(memory.uninit())?.block().len();
         let tight = memory.moved(used).ok_or(BuildError::OutOfMemory { minimum: used })?;
         Ok(OwnedAccel { memory: tight })
     }
@@ -40,10 +43,6 @@ impl OwnedAccel {
     pub fn accel(&self) -> Accel<'_> {
         Accel::recognise(self.memory.bytes()).expect("a built block has a sound header")
     }
-}
-
-fn allocate(size: usize) -> Result<AlignedMemory, BuildError> {
-    AlignedMemory::new(size).ok_or(BuildError::OutOfMemory { minimum: size })
 }
 
 #[cfg(test)]

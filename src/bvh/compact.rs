@@ -5,7 +5,7 @@ use super::tree::{Grown, Limits, PrimRef, gather, grow, leaf_budget};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{Packer, Survey, geometries, shape};
+use crate::prim::{Packer, Shapes, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage;
 
@@ -82,7 +82,7 @@ fn grow_tree(scene: &Scene, census: &Census, plan: &Plan, bytes: &mut [u8]) -> O
         plan.growing.parts_mut(bytes)?;
     geometries(scene, table);
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
-    gather(scene, refs);
+    gather(scene, census, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
     let limits = Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false };
     let node_count = grow(nodes, refs, &limits)?;
@@ -104,11 +104,11 @@ fn pack_leaves(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]
     let (triangles, spheres) = prim_ids.split_at(census.triangle_count as usize);
     let (mut triangles, mut spheres) = (triangles.iter(), spheres.iter());
     let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    let mut shapes = Shapes::new(scene, geometries);
     for_each_leaf(nodes, |node| {
         let (count, is_sphere) = Grown::of(node);
         let ids = if is_sphere { &mut spheres } else { &mut triangles };
-        let shapes = ids.take(count).filter_map(|id| shape(scene, geometries, *id));
-        let leaf = packer.push_leaf(shapes)?;
+        let leaf = packer.push_leaf(ids.take(count).filter_map(|id| shapes.get(*id)))?;
         node.first = leaf.block;
         node.lanes = leaf.lanes;
         Some(())

@@ -180,10 +180,11 @@ struct Content {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bvh::collapse::{Shapes, choose};
+    use crate::bvh::collapse::choose;
     use crate::bvh::split::Areas;
     use crate::bvh::tree::{Limits, PrimRef, grow};
     use crate::math::Aabb;
+    use crate::prim::Shapes;
     use crate::scene::Scene;
     use std::vec::Vec;
 
@@ -273,8 +274,9 @@ mod tests {
 
     fn chosen<const W: usize>(nodes: &[BvhNode]) -> f32 {
         let mut choices = [0; LEAVES - 1];
-        let shapes = Shapes { scene: &Scene::new(&[], &[]), geometries: &[], ids: &[] };
-        choose::<W>(nodes, &shapes, areas(), PRICE, &mut choices).expect("a tree");
+        let scene = Scene::new(&[], &[]);
+        let shapes = &mut Shapes::new(&scene, &[]);
+        choose::<W>(nodes, &[], shapes, areas(), PRICE, &mut choices).expect("a tree");
         let area = |node: u32| areas().of(&nodes[node as usize].aabb());
         let mut sum = area(0) + PRICE * (28 * W) as f32 / 256.0;
         Chosen { nodes, choices: &choices, ids: &[] }

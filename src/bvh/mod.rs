@@ -1,12 +1,14 @@
 //! A bounding volume hierarchy over the leaf blocks, in two forms: a binary tree of 32-byte nodes, or a
 //! tree of bundles.
 
+mod bins;
 mod collapse;
 mod compact;
 mod emit;
 mod fits;
 mod split;
 mod stack;
+mod sweep;
 mod traverse;
 mod tree;
 mod validate;

@@ -1,12 +1,14 @@
-//! Binned SAH: the tree over boxes, before there are leaf blocks.
+//! The binary tree over boxes, before there are leaf blocks.
 
 #![allow(unsafe_code, reason = "a promise about the layout drawn here")]
 
 use super::MAX_DEPTH;
-use super::split::{Areas, Bins, Box4, Extent, best_plane};
-use crate::block::BvhNode;
+use super::bins::{Bins, best_plane};
+use super::split::{Areas, Box4, Extent};
+use super::sweep::{FEW, sweep};
+use crate::block::{BvhNode, Census};
 use crate::math::Aabb;
-use crate::prim::{Shape, for_each_prim};
+use crate::prim::{Shape, for_each_prim_in};
 use crate::scene::Scene;
 use crate::storage::Plain;
 
@@ -17,8 +19,8 @@ use crate::storage::Plain;
 ///      | lower | id | upper | is sphere |
 /// ```
 ///
-/// The numbers stand in the fourth lanes of the box. They are below `2^30`, so as floats they are
-/// numbers too.
+/// The id stands in the fourth lane of the box, below `2^30` and with that bit set. So all lanes are
+/// zero or normal floats: computing with subnormal ones is slow.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(crate) struct PrimRef {
@@ -33,17 +35,26 @@ impl PrimRef {
     /// Where the id is among the words of a ref.
     pub const ID: usize = 3;
 
+    /// Set in that word.
+    const NORMAL: u32 = 1 << 30;
+
+    /// The id in that word.
+    pub fn id_of(word: u32) -> u32 {
+        word & !Self::NORMAL
+    }
+
     pub fn new(id: u32, aabb: &Aabb, sphere: bool) -> Self {
         let lane = |[x, y, z]: [f32; 3], word: u32| {
             // -0 becomes +0.
             [x + 0.0, y + 0.0, z + 0.0, f32::from_bits(word)]
         };
-        let (lower, upper) = (lane(aabb.lower, id), lane(aabb.upper, sphere.into()));
+        let sphere = if sphere { 1.0f32.to_bits() } else { 0 };
+        let (lower, upper) = (lane(aabb.lower, id | Self::NORMAL), lane(aabb.upper, sphere));
         PrimRef { bounds: Box4 { lower, upper } }
     }
 
     pub fn id(&self) -> u32 {
-        self.bounds.lower[3].to_bits()
+        Self::id_of(self.bounds.lower[3].to_bits())
     }
 
     pub fn is_sphere(&self) -> bool {
@@ -52,9 +63,9 @@ impl PrimRef {
 }
 
 /// Writes a ref for each primitive that can be hit.
-pub(crate) fn gather(scene: &Scene, refs: &mut [PrimRef]) {
+pub(crate) fn gather(scene: &Scene, census: &Census, refs: &mut [PrimRef]) {
     let mut free = refs.iter_mut();
-    for_each_prim(scene, |prim| {
+    for_each_prim_in(scene, 0..u32::MAX, census.ignored_count == 0, |prim| {
         if let Some(r) = free.next() {
             let sphere = matches!(prim.shape, Shape::Sphere { .. });
             *r = PrimRef::new(prim.id, &prim.shape.aabb(), sphere);
@@ -229,14 +240,32 @@ fn part(
         // Everything on one line or in one point: any split is as good as another.
         STEP_COST * area + work < area * count as f32 || area == 0.0
     };
-    let plane = best_plane(refs, &task.extent, areas, bins);
-    let sah = plane.filter(|plane| !may_be_leaf || deep || pays(plane.work)).and_then(|plane| {
-        let left_count = plane.part(refs);
-        let least = least(left_count);
+    let lasts = |left_count: usize| {
+        let [left, right] = least(left_count);
         let levels = levels_to_halve(left_count.max(count - left_count), leaf_max);
-        let lasts = least[0] + least[1] <= task.budget && task.depth + 1 + levels < MAX_DEPTH;
-        lasts.then(|| split_at(refs, left_count, least))
-    });
+        left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
+    };
+    let sah = if count <= FEW {
+        let sweep = sweep(refs, areas, lasts).filter(|s| !may_be_leaf || deep || pays(s.work));
+        sweep.map(|s| Split {
+            left_count: s.left_count,
+            least: least(s.left_count),
+            sides: s.sides,
+        })
+    } else {
+        // The box of the centres is a guess; when all are in one bin of it, it is looked for.
+        let exact = |bins| best_plane(refs, &Extent::around(refs).centres, areas, bins);
+        let plane = best_plane(refs, &task.extent.centres, areas, bins).or_else(|| exact(bins));
+        plane.and_then(|plane| {
+            let left_count = plane.part(refs);
+            let sides = || plane.sides(refs, left_count, &task.extent.centres);
+            lasts(left_count).then(|| Split {
+                left_count,
+                least: least(left_count),
+                sides: sides(),
+            })
+        })
+    };
     match sah {
         Some(split) => Some(split),
         None if may_be_leaf => None,

@@ -1,6 +1,6 @@
 //! The wide layouts: from a scene to bundles in the caller's memory.
 
-use super::collapse::{Shapes, choose};
+use super::collapse::choose;
 use super::compact;
 use super::emit::{BEGINS, Chosen, Sizes};
 use super::split::Areas;
@@ -9,7 +9,7 @@ use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{Packer, Survey, geometries, shape};
+use crate::prim::{Packer, Shapes, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT, Plain};
 
@@ -154,14 +154,14 @@ fn grow_tree(
     let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
     let refs = storage::view_mut::<PrimRef>(front, places.refs, prims)?;
-    gather(scene, refs);
+    gather(scene, census, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
     let limits = Limits { leaves: places.leaves, leaf_max: LEAF_MAX, mixed, deep: true };
     let count = grow(nodes, refs, &limits)?;
     // From the last on, each id goes to the end of the refs' place, onto refs that are done.
     let words = storage::view_mut::<u32>(front, places.refs, 8 * prims)?;
     for i in (0..prims).rev() {
-        words[7 * prims + i] = words[8 * i + PrimRef::ID];
+        words[7 * prims + i] = PrimRef::id_of(words[8 * i + PrimRef::ID]);
     }
     Some(count)
 }
@@ -200,7 +200,7 @@ impl Scratch {
         let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
         let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
         let geometries = table.parts_mut(front)?.geometries;
-        choose::<W>(nodes, &Shapes { scene, geometries, ids }, areas, price, choices)?;
+        choose::<W>(nodes, ids, &mut Shapes::new(scene, geometries), areas, price, choices)?;
         Chosen { nodes, choices, ids }.sizes::<W>()
     }
 
@@ -226,12 +226,13 @@ fn pack(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Op
     let PartsMut { geometries, prim_ids, sphere_blocks, triangle_blocks, .. } =
         counts.parts_mut(bytes)?;
     let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    let mut shapes = Shapes::new(scene, geometries);
     for id in prim_ids {
         if *id & BEGINS != 0 {
             packer.close();
         }
         *id &= !BEGINS;
-        packer.push(&shape(scene, geometries, *id)?)?;
+        packer.push(&shapes.get(*id)?)?;
     }
     (packer.triangle_block_count() == counts.triangle_blocks as usize).then_some(())
 }
