@@ -12,6 +12,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("scene", &[]),
     ("storage", &[]),
     ("simd", &[]),
+    ("caller", &[]),
     ("exact", &["math"]),
     ("ray", &["exact", "math", "simd"]),
     ("block", &["error", "math", "storage"]),
@@ -22,15 +23,21 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("prim", &["block", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"]),
     ("list", &["block", "error", "prim", "scene"]),
     ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd"]),
-    ("bvh", &["block", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"]),
+    (
+        "bvh",
+        &["block", "caller", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"],
+    ),
     ("surface", &["interval", "math", "ray"]),
     (
         "accel",
         &["block", "bvh", "error", "grid", "prim", "query", "ray", "simd", "storage", "surface"],
     ),
-    ("build", &["accel", "block", "bvh", "error", "grid", "list", "prim", "scene", "storage"]),
-    ("owned", &["accel", "build", "error", "scene", "storage"]),
-    ("capi", &["accel", "build", "error", "query", "ray", "scene", "storage", "surface"]),
+    (
+        "build",
+        &["accel", "block", "bvh", "caller", "error", "grid", "list", "prim", "scene", "storage"],
+    ),
+    ("owned", &["accel", "build", "caller", "error", "scene", "storage"]),
+    ("capi", &["accel", "build", "caller", "error", "query", "ray", "scene", "storage", "surface"]),
 ];
 
 #[test]

@@ -4,9 +4,24 @@ use super::split::{Areas, Box4, Extent, centre, greater, lesser};
 use super::tree::PrimRef;
 
 /// Bins along each axis at most.
-const BINS: usize = 16;
-/// Of more refs than twice this, some are enough to choose a plane by.
-const SAMPLES: usize = 512;
+const BINS: usize = 32;
+
+/// How carefully planes are chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Bins along each axis, at most [`BINS`].
+    bins: usize,
+    /// Of more refs than twice this, some are enough to choose a plane by.
+    samples: usize,
+    /// Whether only the axis is looked at along which the centres are furthest apart.
+    one_axis: bool,
+}
+
+impl Effort {
+    pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true };
+    pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false };
+    pub const BEST: Effort = Effort { bins: BINS, samples: 1 << 29, one_axis: false };
+}
 
 /// How centres fall into bins.
 #[derive(Clone, Copy)]
@@ -17,9 +32,9 @@ struct Binning {
 }
 
 impl Binning {
-    fn new(centres: &Box4, count: usize) -> Self {
+    fn new(centres: &Box4, count: usize, most: usize) -> Self {
         // Few refs leave most bins empty.
-        let bins = (4 + count / 8).min(BINS);
+        let bins = (4 + count / 8).min(most);
         let scale = core::array::from_fn(|k| bins as f32 / (centres.upper[k] - centres.lower[k]));
         Binning { lower: centres.lower, scale, bins }
     }
@@ -110,22 +125,29 @@ pub(crate) fn best_plane(
     refs: &[PrimRef],
     centres: &Box4,
     areas: Areas,
+    effort: Effort,
     Bins(axes): &mut Bins,
 ) -> Option<Plane> {
-    let binning = Binning::new(centres, refs.len());
-    for axis in axes.iter_mut() {
+    let binning = Binning::new(centres, refs.len(), effort.bins);
+    let first = if effort.one_axis { centres.widest() } else { 0 };
+    let looked_at = if effort.one_axis { first..first + 1 } else { 0..3 };
+    for axis in &mut axes[looked_at.clone()] {
         axis.bounds[..binning.bins].fill(Box4::EMPTY);
         axis.counts[..binning.bins].fill(0);
     }
-    let all = refs.len() < 2 * SAMPLES;
-    if all {
-        fill(refs.iter(), &binning, axes);
-    } else {
-        fill(refs.iter().step_by(refs.len() / SAMPLES), &binning, axes);
+    let all = refs.len() < 2 * effort.samples;
+    let step = if all { 1 } else { refs.len() / effort.samples };
+    let sample = refs.iter().step_by(step);
+    match &mut axes[looked_at.clone()] {
+        [axis] => sample.for_each(|r| axis.add(r, binning.bins_of(r)[first])),
+        axes => sample.for_each(|r| {
+            let bins = binning.bins_of(r);
+            axes.iter_mut().zip(bins).for_each(|(axis, bin)| axis.add(r, bin));
+        }),
     }
     let mut best = (f32::INFINITY, 0, 0);
-    for (k, axis) in axes.iter().enumerate() {
-        let (work, bin) = axis.best(binning.bins, areas);
+    for k in looked_at {
+        let (work, bin) = axes[k].best(binning.bins, areas);
         if work < best.0 {
             best = (work, k, bin);
         }
@@ -139,18 +161,13 @@ pub(crate) fn best_plane(
     Some(Plane { binning, axis, bin, bounds })
 }
 
-#[inline]
-fn fill<'r>(refs: impl Iterator<Item = &'r PrimRef>, binning: &Binning, axes: &mut [Axis; 3]) {
-    for r in refs {
-        let bins = binning.bins_of(r);
-        for (axis, bin) in axes.iter_mut().zip(bins) {
-            axis.bounds[bin].add(&r.bounds);
-            axis.counts[bin] += 1;
-        }
-    }
-}
-
 impl Axis {
+    #[inline]
+    fn add(&mut self, r: &PrimRef, bin: usize) {
+        self.bounds[bin].add(&r.bounds);
+        self.counts[bin] += 1;
+    }
+
     /// The least work of a split, and the first bin on its right; 0 when there is none.
     fn best(&self, bins: usize, areas: Areas) -> (f32, usize) {
         let (bounds, counts) = (&self.bounds[..bins], &self.counts[..bins]);

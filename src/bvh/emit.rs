@@ -180,9 +180,11 @@ struct Content {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::bins::Effort;
     use crate::bvh::collapse::choose;
     use crate::bvh::split::Areas;
     use crate::bvh::tree::{Limits, PrimRef, grow};
+    use crate::caller::Caller;
     use crate::math::Aabb;
     use crate::prim::Shapes;
     use crate::scene::Scene;
@@ -206,8 +208,15 @@ mod tests {
             })
             .collect();
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * LEAVES];
-        let limits = Limits { leaves: LEAVES, leaf_max: 1, mixed: false, deep: true };
-        assert_eq!(grow(&mut nodes, &mut refs, &limits), Some(2 * LEAVES));
+        let limits = Limits {
+            leaves: LEAVES,
+            leaf_max: 1,
+            mixed: false,
+            deep: true,
+            effort: Effort::BALANCED,
+        };
+        let caller = &Caller::new(None, None);
+        assert_eq!(grow(&mut nodes, &mut refs, &limits, caller), Some(2 * LEAVES));
         for node in nodes.iter_mut().filter(|node| node.is_leaf()) {
             node.lanes = spheres | 1 << 8;
         }

@@ -29,6 +29,13 @@ impl Box4 {
         all
     }
 
+    /// The axis along which it is widest.
+    pub fn widest(&self) -> usize {
+        let width = |k: usize| self.upper[k] - self.lower[k];
+        let axis = if width(1) > width(0) { 1 } else { 0 };
+        if width(2) > width(axis) { 2 } else { axis }
+    }
+
     /// The box around a point.
     #[inline]
     pub fn at(point: [f32; 4]) -> Box4 {

@@ -49,9 +49,7 @@ fn sort(refs: &mut [PrimRef]) {
     for r in refs.iter() {
         centres.add(&Box4::at(centre(r)));
     }
-    let width = |k: usize| centres.upper[k] - centres.lower[k];
-    let axis = if width(1) > width(0) { 1 } else { 0 };
-    let axis = if width(2) > width(axis) { 2 } else { axis };
+    let axis = centres.widest();
     let mut keys = [0.0; FEW];
     for i in 0..refs.len() {
         let (r, key) = (refs[i], centre(&refs[i])[axis]);

@@ -58,7 +58,15 @@ impl Shape {
     #[inline]
     pub fn aabb(&self) -> Aabb {
         match *self {
-            Shape::Triangle(corners) => Aabb::around(&corners),
+            Shape::Triangle([a, b, c]) => {
+                // Of equal zeros the first stays, as in `Aabb::add`; but without a branch.
+                let least = |x: f32, y: f32| if y < x { y } else { x };
+                let most = |x: f32, y: f32| if y > x { y } else { x };
+                Aabb {
+                    lower: [0, 1, 2].map(|k| least(least(a[k], b[k]), c[k])),
+                    upper: [0, 1, 2].map(|k| most(most(a[k], b[k]), c[k])),
+                }
+            }
             Shape::Sphere { centre, radius } => {
                 // Sums of two floats far apart in size are rounded in f64 too: one step outwards
                 // makes up for it.
