@@ -37,11 +37,12 @@
 // "No primitive", "no geometry", "not in an instance".
 #define RT_NONE 0xFFFFFFFFu
 
-// `RtBuildOptions.quality`: binned surface area heuristic.
+// `RtBuildOptions.quality`, for a BVH: surface area heuristic over 16 bins on each axis, for large
+// nodes by samples.
 #define RT_QUALITY_BALANCED 0
-// For a structure that is built for every frame. Unsupported so far.
+// For a structure that is built often: the widest axis alone, fewer samples.
 #define RT_QUALITY_FAST 1
-// For a structure that is built once. Unsupported so far.
+// For a structure that is built once: 32 bins, every primitive in them.
 #define RT_QUALITY_BEST 2
 
 // `RtBuildOptions.layout`: bundles of 16. The block says how it is read, not the machine: every
@@ -159,10 +160,12 @@ typedef struct RtScene {
 typedef void (*RtTask)(void *context, uint32_t index);
 
 // The caller's threads: calls `task(context, i)` for each `i` below `count`, in any order and on
-// any thread, and returns when all are done. Tasks never block and never nest.
+// any thread, and returns when all are done; `context` is dead then. Tasks never block and never
+// nest. The block has the same bytes with any number of threads.
 typedef void (*RtParallelFor)(void *user, uint32_t count, RtTask task, void *context);
 
-// How far a build is, from 0 to 1; false cancels it. Called on the thread that builds.
+// How far a build is, from 0 to 1; false cancels it: RT_ERROR_CANCELLED. Called on the thread that
+// builds, a few times a build.
 typedef bool (*RtProgress)(void *user, float done);
 
 // What a build may choose. Zero in every field but the first suits most scenes.
@@ -176,13 +179,13 @@ typedef struct RtBuildOptions {
     uint32_t refit;
     // One of `RT_PLAIN_LIST_`.
     uint32_t plain_list;
-    // How many tasks of `parallel_for` may run at once; without it, ignored.
+    // How many tasks of `parallel_for` may run at once; with less than two it is not called.
     uint32_t worker_count;
     // Handed to the two calls below.
     void *user;
-    // Or null. Unsupported so far: with it a build is refused.
+    // Or null: all is done on the calling thread. Speeds up the tree of a BVH.
     RtParallelFor parallel_for;
-    // Or null. Unsupported so far: with it a build is refused.
+    // Or null.
     RtProgress progress;
 } RtBuildOptions;
 
@@ -323,6 +326,8 @@ typedef struct RtSurface {
 #define RT_ERROR_NOT_FOUND 15
 // A fault of the library, which was stopped before it reached the caller. Please report it.
 #define RT_ERROR_INTERNAL 16
+// `progress` returned false. The memory holds no structure and may be used again.
+#define RT_ERROR_CANCELLED 17
 
 #ifdef __cplusplus
 extern "C" {

@@ -1,14 +1,17 @@
 //! Builds: what may be chosen, how much memory it takes, and which structure it becomes.
 
+use core::fmt;
 use core::mem::MaybeUninit;
 
 use crate::accel::{Accel, Layout};
 use crate::block::Census;
+use crate::bvh::{self, Effort, How};
+use crate::caller::{Caller, Threads};
 use crate::error::{BuildError, Unsupported};
 use crate::prim::{Survey, survey};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT};
-use crate::{bvh, grid, list};
+use crate::{grid, list};
 
 /// How much memory a build wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,12 +27,12 @@ pub struct Memory {
 /// How much time a build may take for the sake of the rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
-    /// Binned SAH.
+    /// SAH over 16 bins on each axis, for large nodes by samples.
     #[default]
     Balanced,
-    /// For a structure that is built every frame. Not in this version.
+    /// For a structure that is built often: the widest axis alone, fewer samples.
     Fast,
-    /// For a structure that is built once. Not in this version.
+    /// For a structure that is built once: 32 bins, every primitive in them.
     Best,
 }
 
@@ -46,9 +49,11 @@ pub enum PlainList {
 }
 
 /// What a build may choose. The default in every field suits most scenes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct BuildOptions {
-    /// Time spent on building.
+///
+/// For the same choices a block has the same bytes on every machine and with any number of threads.
+#[derive(Clone, Copy, Default)]
+pub struct BuildOptions<'a> {
+    /// Time spent on a BVH; grids have but one way.
     pub quality: Quality,
     /// The layout of a BVH.
     pub layout: Layout,
@@ -56,6 +61,25 @@ pub struct BuildOptions {
     pub refit: bool,
     /// Whether a plain list may stand in.
     pub plain_list: PlainList,
+    /// Threads that the build may use; none of them is kept. They make a BVH's tree; the rest, and a grid, is
+    /// built by the caller's own.
+    pub threads: Option<&'a dyn Threads>,
+    /// Told how far the build is, from 0 to 1, on the thread that builds; false cancels it. It is
+    /// asked a few times a build, not at equal times.
+    pub progress: Option<&'a dyn Fn(f32) -> bool>,
+}
+
+impl fmt::Debug for BuildOptions<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("BuildOptions")
+            .field("quality", &self.quality)
+            .field("layout", &self.layout)
+            .field("refit", &self.refit)
+            .field("plain_list", &self.plain_list)
+            .field("threads", &self.threads.map(|threads| threads.worker_count()))
+            .field("progress", &self.progress.is_some())
+            .finish()
+    }
 }
 
 /// The memory [`build_bvh`] needs for `scene`.
@@ -71,14 +95,15 @@ pub fn grid_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, Build
 /// Builds a BVH over `scene` at the front of `memory`.
 ///
 /// `memory` starts at a multiple of 64 bytes and holds at least the minimum of [`bvh_needs`]; with
-/// less than its size the leaves are larger, and in the last resort the layout is compact. The finished block is [`Accel::block`]; what lies behind
-/// it is free again. On an error nothing was written.
+/// less than its size the leaves are larger, and in the last resort the layout is compact. The
+/// finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
+/// written, unless the build was cancelled.
 pub fn build_bvh<'m>(
     scene: &Scene,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, options.bvh())?.run(memory)
+    Job::new(scene, options, options.bvh())?.run_in(memory)
 }
 
 /// Builds a regular grid over `scene` at the front of `memory`.
@@ -92,11 +117,12 @@ pub fn build_grid<'m>(
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, Structure::Grid)?.run(memory)
+    Job::new(scene, options, Structure::Grid)?.run_in(memory)
 }
 
+/// What a build makes of a scene.
 #[derive(Clone, Copy, PartialEq)]
-enum Structure {
+pub(crate) enum Structure {
     List,
     Grid,
     Bvh,
@@ -105,23 +131,24 @@ enum Structure {
 }
 
 /// A build that was checked and sized, but not begun.
-struct Job<'s, 'a> {
+pub(crate) struct Job<'s, 'a> {
     scene: &'s Scene<'a>,
     survey: Survey,
     census: Census,
     structure: Structure,
-    memory: Memory,
+    options: &'s BuildOptions<'s>,
+    pub memory: Memory,
 }
 
 impl<'s, 'a> Job<'s, 'a> {
-    fn new(
+    pub fn new(
         scene: &'s Scene<'a>,
-        options: &BuildOptions,
+        options: &'s BuildOptions<'s>,
         asked: Structure,
     ) -> Result<Self, BuildError> {
         options.check()?;
         let survey = survey(scene)?;
-        let census = Census::take(scene, &survey);
+        let census = Census::take(scene, &survey)?;
         let handful = match options.plain_list {
             PlainList::Automatic => list::HANDFUL,
             PlainList::Never => 0,
@@ -135,10 +162,11 @@ impl<'s, 'a> Job<'s, 'a> {
             Structure::Wide(width) => bvh::needs_wide(&survey, &census, width)?,
         };
         let memory = Memory { size, minimum, alignment: ALIGNMENT };
-        Ok(Job { scene, survey, census, structure, memory })
+        Ok(Job { scene, survey, census, structure, options, memory })
     }
 
-    fn run<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
+    /// Builds into memory that may hold anything.
+    fn run_in<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
         let Memory { size, minimum, alignment } = self.memory;
         if !memory.as_ptr().addr().is_multiple_of(alignment) {
             return Err(BuildError::Misaligned);
@@ -147,27 +175,39 @@ impl<'s, 'a> Job<'s, 'a> {
             return Err(BuildError::OutOfMemory { minimum });
         }
         let usable = memory.len().min(size);
-        let bytes = storage::zeroed(&mut memory[..usable]);
-        let Job { scene, survey, census, .. } = self;
-        match self.structure {
-            Structure::List => list::build(scene, survey, census, bytes)?,
-            Structure::Grid => grid::build(scene, survey, census, bytes)?,
-            Structure::Bvh => bvh::build(scene, survey, census, bytes)?,
-            Structure::Wide(width) => bvh::build_wide(scene, survey, census, width, bytes)?,
+        self.run(storage::zeroed(&mut memory[..usable]))
+    }
+
+    /// Builds into zero bytes, aligned and at least the minimum.
+    pub fn run<'m>(&self, bytes: &'m mut [u8]) -> Result<Accel<'m>, BuildError> {
+        let minimum = self.memory.minimum;
+        let Job { scene, survey, census, options, .. } = self;
+        let caller = Caller::new(options.threads, options.progress);
+        caller.done(0.0).ok_or(BuildError::Cancelled)?;
+        let effort = match options.quality {
+            Quality::Fast => Effort::FAST,
+            Quality::Balanced => Effort::BALANCED,
+            Quality::Best => Effort::BEST,
         };
+        let how = How { effort, caller: &caller };
+        let built = match self.structure {
+            Structure::List => list::build(scene, survey, census, bytes),
+            Structure::Grid => grid::build(scene, survey, census, bytes),
+            Structure::Bvh => bvh::build(scene, survey, census, &how, bytes),
+            Structure::Wide(width) => bvh::build_wide(scene, survey, census, width, &how, bytes),
+        };
+        caller.done(1.0).ok_or(BuildError::Cancelled)?;
+        built?;
         // A block that was just sealed is always recognised, so this error does not arise.
         Accel::recognise(bytes).map_err(|_| BuildError::OutOfMemory { minimum })
     }
 }
 
-impl BuildOptions {
+impl BuildOptions<'_> {
     fn check(&self) -> Result<(), BuildError> {
         match self.layout {
             Layout::Automatic | Layout::Compact | Layout::Wide(4 | 8 | 16) => {}
             Layout::Wide(width) => return Err(BuildError::NoSuchLayout { width }),
-        }
-        if self.quality != Quality::Balanced {
-            return Err(BuildError::Unsupported(Unsupported::Quality));
         }
         if self.refit {
             return Err(BuildError::Unsupported(Unsupported::Refit));
@@ -176,7 +216,7 @@ impl BuildOptions {
     }
 
     /// The structure of a BVH with this layout.
-    fn bvh(&self) -> Structure {
+    pub(crate) fn bvh(&self) -> Structure {
         match self.layout {
             Layout::Automatic => Structure::Wide(16),
             Layout::Compact => Structure::Bvh,

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// Why a build was refused. Nothing was written.
+/// Why a build was refused. Nothing was written, unless it was cancelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum BuildError {
@@ -33,6 +33,8 @@ pub enum BuildError {
         /// The width asked for.
         width: u32,
     },
+    /// The caller's progress callback said to stop. The memory holds no structure and may be used again.
+    Cancelled,
     /// The option is part of the interface but not of this version.
     Unsupported(Unsupported),
 }
@@ -41,8 +43,6 @@ pub enum BuildError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unsupported {
-    /// A quality other than balanced.
-    Quality,
     /// Refitting.
     Refit,
 }
@@ -84,6 +84,7 @@ impl fmt::Display for BuildError {
             BuildError::NoSuchLayout { width } => {
                 write!(f, "there are no bundles of {width} lanes: 4, 8 or 16")
             }
+            BuildError::Cancelled => f.write_str("the caller cancelled the build"),
             BuildError::Unsupported(what) => write!(f, "this version cannot build it: {what}"),
         }
     }
@@ -92,7 +93,6 @@ impl fmt::Display for BuildError {
 impl fmt::Display for Unsupported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Unsupported::Quality => "only the balanced quality exists so far",
             Unsupported::Refit => "blocks cannot be refitted yet",
         })
     }

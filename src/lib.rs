@@ -30,6 +30,7 @@
 //! |---|---|---|
 //! | `std` (default) | `alloc`; square roots from std; panics stopped at the C boundary | std |
 //! | `alloc` | [`OwnedAccel`] | a global allocator |
+//! | `parallel` | `Rayon`, threads for [`BuildOptions::threads`] | std and the crate rayon |
 //! | `libm` | square roots without std | the crate libm |
 //! | `capi` | the C entry points `rt_...` of `include/raykern.h` | about 20 kB |
 //! | `capi-panic` | a panic handler, for a C library without std | a few bytes |
@@ -55,6 +56,7 @@ mod batch;
 mod block;
 mod build;
 mod bvh;
+mod caller;
 #[cfg(feature = "capi")]
 #[allow(unsafe_code, reason = "C passes pointers, and calls by name")]
 mod capi;
@@ -80,9 +82,12 @@ pub use accel::{Accel, Info, Kind, Layout};
 pub use build::{
     BuildOptions, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
 };
+pub use caller::Threads;
 pub use error::{BuildError, OpenError, Unsupported};
 #[cfg(feature = "alloc")]
 pub use owned::OwnedAccel;
+#[cfg(feature = "parallel")]
+pub use owned::Rayon;
 pub use query::{Counts, Facing, Precision, PrimId, QueryOptions};
 pub use ray::{Hit, NONE, Ray};
 pub use scene::{Mesh, Scene, SphereSet, Strided};

@@ -1,39 +1,57 @@
 //! A built structure in memory of its own: the outer shell, and the only place that allocates.
 
 use crate::accel::Accel;
-use crate::build::{BuildOptions, Memory, build_bvh, build_grid, bvh_needs, grid_needs};
+use crate::build::{BuildOptions, Job, Structure};
 use crate::error::BuildError;
 use crate::scene::Scene;
 use crate::storage::AlignedMemory;
 
+/// The threads of rayon's pool, for [`BuildOptions::threads`].
+#[cfg(feature = "parallel")]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rayon;
+
+#[cfg(feature = "parallel")]
+impl crate::caller::Threads for Rayon {
+    fn worker_count(&self) -> usize {
+        rayon::current_num_threads()
+    }
+
+    fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+        use rayon::prelude::*;
+        (0..count).into_par_iter().with_max_len(1).for_each(task);
+    }
+}
+
 /// A built structure in memory of its own.
 ///
-/// The block is moved to a place of its own size after the build, so nothing of the scratch memory
-/// stays.
+/// The scratch memory is given back after the build.
 pub struct OwnedAccel {
     memory: AlignedMemory,
 }
 
 impl OwnedAccel {
-    /// Builds a BVH; see [`build_bvh`].
+    /// Builds a BVH; see [`build_bvh`](crate::build_bvh).
     pub fn bvh(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
-        let Memory { size, .. } = bvh_needs(scene, options)?;
-        let mut memory = allocate(size)?;
-        let used = build_bvh(scene, options, memory.uninit())?.block().len();
-        Self::keep(memory, used)
+        Self::build(scene, options, options.bvh())
     }
 
-    /// Builds a grid; see [`build_grid`].
+    /// Builds a grid; see [`build_grid`](crate::build_grid).
     pub fn grid(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
-        let Memory { size, .. } = grid_needs(scene, options)?;
-        let mut memory = allocate(size)?;
-        let used = build_grid(scene, options, memory.uninit())?.block().len();
-        Self::keep(memory, used)
+        Self::build(scene, options, Structure::Grid)
     }
 
-    fn keep(memory: AlignedMemory, used: usize) -> Result<Self, BuildError> {
-        let tight = memory.moved(used).ok_or(BuildError::OutOfMemory { minimum: used })?;
-        Ok(OwnedAccel { memory: tight })
+    fn build(
+        scene: &Scene,
+        options: &BuildOptions,
+        structure: Structure,
+    ) -> Result<Self, BuildError> {
+        let job = Job::new(scene, options, structure)?;
+        let size = job.memory.size;
+        let memory = AlignedMemory::new(size);
+        let mut memory = memory.ok_or(BuildError::OutOfMemory { minimum: size })?;
+        let used = job.run(memory.bytes_mut())?.block().len();
+        Ok(OwnedAccel { memory: memory.shrunk(used) })
     }
 
     /// The structure. Cheap, but not free: keep the view while tracing.
@@ -42,17 +60,12 @@ impl OwnedAccel {
     }
 }
 
-fn allocate(size: usize) -> Result<AlignedMemory, BuildError> {
-    AlignedMemory::new(size).ok_or(BuildError::OutOfMemory { minimum: size })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::build::PlainList;
     use crate::error::OpenError;
     use crate::scene::Mesh;
-    use crate::storage;
 
     /// The first primitive id of a block over one geometry: behind the header and its line.
     const FIRST_ID: usize = 192;
@@ -69,7 +82,7 @@ mod tests {
                 let block = built.accel().block();
                 assert!(Accel::open(block).is_ok());
                 let mut copy = AlignedMemory::new(block.len()).expect("memory");
-                let bytes = storage::zeroed(copy.uninit());
+                let bytes = copy.bytes_mut();
                 bytes.copy_from_slice(block);
                 assert!(Accel::open(bytes).is_ok());
                 bytes[FIRST_ID] = 1;

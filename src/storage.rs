@@ -83,46 +83,59 @@ pub(crate) unsafe fn from_raw<'m>(block: *const u8, size: usize) -> &'m [u8] {
     unsafe { core::slice::from_raw_parts(block, size) }
 }
 
-/// Memory from the global allocator, aligned as blocks are.
+/// Zero bytes from the global allocator, aligned as blocks are.
+///
+/// The allocator is asked for no alignment, so that it can give back the end of a large piece without
+/// moving the rest.
 #[cfg(feature = "alloc")]
-pub(crate) struct AlignedMemory(alloc::vec::Vec<MaybeUninit<Line>>);
-
-#[cfg(feature = "alloc")]
-#[derive(Clone, Copy)]
-#[repr(C, align(64))]
-struct Line([u8; ALIGNMENT]);
+pub(crate) struct AlignedMemory {
+    memory: alloc::vec::Vec<u8>,
+    start: usize,
+    size: usize,
+}
 
 #[cfg(feature = "alloc")]
 impl AlignedMemory {
-    /// `size` zero bytes, rounded up to whole lines; `None` when there is no memory.
+    /// `size` zero bytes; `None` when there is no memory.
     pub fn new(size: usize) -> Option<Self> {
-        let lines = size.div_ceil(ALIGNMENT);
-        let mut memory = alloc::vec::Vec::new();
-        memory.try_reserve_exact(lines).ok()?;
-        memory.resize(lines, MaybeUninit::new(Line([0; ALIGNMENT])));
-        Some(AlignedMemory(memory))
+        let layout = core::alloc::Layout::array::<u8>(size.checked_add(ALIGNMENT)?).ok()?;
+        // SAFETY: the layout has at least `ALIGNMENT` bytes.
+        let memory = unsafe { alloc::alloc::alloc_zeroed(layout) };
+        if memory.is_null() {
+            return None;
+        }
+        // SAFETY: allocated just now by the global allocator with the layout of that many bytes, all of
+        // which are zero.
+        let memory =
+            unsafe { alloc::vec::Vec::from_raw_parts(memory, layout.size(), layout.size()) };
+        let start = Self::start(&memory);
+        Some(AlignedMemory { memory, start, size })
     }
 
-    /// The first `size` bytes in memory of just that size.
-    pub fn moved(self, size: usize) -> Option<Self> {
-        let lines = self.0.get(..size.div_ceil(ALIGNMENT))?;
-        let mut memory = alloc::vec::Vec::new();
-        memory.try_reserve_exact(lines.len()).ok()?;
-        memory.extend_from_slice(lines);
-        Some(AlignedMemory(memory))
+    /// Keeps the first `size` bytes and gives the rest back.
+    pub fn shrunk(mut self, size: usize) -> Self {
+        self.size = self.size.min(size);
+        let start = self.start;
+        self.memory.truncate(start + self.size + ALIGNMENT);
+        self.memory.shrink_to_fit();
+        self.start = Self::start(&self.memory);
+        if self.start != start {
+            self.memory.copy_within(start..start + self.size, self.start);
+        }
+        self
+    }
+
+    fn start(memory: &[u8]) -> usize {
+        memory.as_ptr().addr().wrapping_neg() % ALIGNMENT
     }
 
     /// The bytes to build into.
-    pub fn uninit(&mut self) -> &mut [MaybeUninit<u8>] {
-        let size = size_of_val(self.0.as_slice());
-        // SAFETY: the lines are `size` bytes, one after the other, and any byte may be unwritten.
-        unsafe { core::slice::from_raw_parts_mut(self.0.as_mut_ptr().cast(), size) }
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut self.memory[self.start..][..self.size]
     }
 
-    /// The bytes, all of which were written when they were zeroed.
+    /// The bytes.
     pub fn bytes(&self) -> &[u8] {
-        let size = size_of_val(self.0.as_slice());
-        // SAFETY: `new` writes every line, builds write whole bytes, and `moved` copies lines.
-        unsafe { core::slice::from_raw_parts(self.0.as_ptr().cast(), size) }
+        &self.memory[self.start..][..self.size]
     }
 }

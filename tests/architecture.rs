@@ -12,6 +12,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("scene", &[]),
     ("storage", &[]),
     ("simd", &[]),
+    ("caller", &[]),
     ("exact", &["math"]),
     ("ray", &["exact", "math", "simd"]),
     ("block", &["error", "math", "storage"]),
@@ -22,7 +23,10 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("prim", &["block", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"]),
     ("list", &["block", "error", "prim", "scene"]),
     ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd"]),
-    ("bvh", &["block", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"]),
+    (
+        "bvh",
+        &["block", "caller", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"],
+    ),
     ("surface", &["interval", "math", "ray"]),
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "prim", "query", "ray", "simd", "trace"]),
@@ -30,9 +34,12 @@ const HOUSE: &[(&str, &[&str])] = &[
         "accel",
         &["batch", "block", "bvh", "error", "grid", "prim", "query", "ray", "surface", "trace"],
     ),
-    ("build", &["accel", "block", "bvh", "error", "grid", "list", "prim", "scene", "storage"]),
-    ("owned", &["accel", "build", "error", "scene", "storage"]),
-    ("capi", &["accel", "build", "error", "query", "ray", "scene", "storage", "surface"]),
+    (
+        "build",
+        &["accel", "block", "bvh", "caller", "error", "grid", "list", "prim", "scene", "storage"],
+    ),
+    ("owned", &["accel", "build", "caller", "error", "scene", "storage"]),
+    ("capi", &["accel", "build", "caller", "error", "query", "ray", "scene", "storage", "surface"]),
 ];
 
 #[test]

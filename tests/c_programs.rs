@@ -95,6 +95,11 @@ fn threads() {
 }
 
 #[test]
+fn builds() {
+    program("builds", "c_tests/builds.c", false, &["-std=c11", "-frounding-math"]);
+}
+
+#[test]
 fn control() {
     program("control", "c_tests/control.c", false, &["-std=c11", "-frounding-math"]);
 }

@@ -42,7 +42,7 @@ const fn bvh(name: &'static str, layout: Layout) -> Structure {
 }
 
 impl Structure {
-    fn options(&self) -> BuildOptions {
+    fn options(&self) -> BuildOptions<'static> {
         let (layout, plain_list) = (self.layout, PlainList::Never);
         BuildOptions { layout, plain_list, ..BuildOptions::default() }
     }

@@ -4,11 +4,10 @@ use super::MAX_DEPTH;
 use super::fits::Corners;
 use super::split::Areas;
 use super::tree::Grown;
+use crate::block::BvhNode;
 use crate::block::leaf::{SPHERES, TRIANGLES};
-use crate::block::{BvhNode, Geometry};
 use crate::math::Aabb;
-use crate::prim::{Shape, shape};
-use crate::scene::Scene;
+use crate::prim::{Shape, Shapes};
 
 /// What becomes of an inner node.
 ///
@@ -51,13 +50,6 @@ pub(crate) fn choice_of(choices: &[u64], node: &BvhNode) -> Option<Choice> {
     choices.get((node.first as usize / 2).checked_sub(1)?).map(|bits| Choice(*bits))
 }
 
-/// The scene, as far as it takes to know which triangles share vertices.
-pub(crate) struct Shapes<'s, 'a> {
-    pub scene: &'s Scene<'a>,
-    pub geometries: &'s [Geometry],
-    pub ids: &'s [u32],
-}
-
 /// A subtree that is decided, and what it may still be part of.
 #[derive(Clone, Copy)]
 struct Decided<const W: usize> {
@@ -83,7 +75,8 @@ enum Content {
     Much,
 }
 
-/// Writes a choice for each inner node, so that the tree of bundles costs least.
+/// Writes a choice for each inner node, so that the tree of bundles costs least. `ids` are those of the
+/// tree's leaves; which triangles share vertices is seen in `shapes`.
 ///
 /// A ray that enters a box pays 1 for the bundle or the leaf block in it, whatever that holds;
 /// boxes are entered in proportion to their area. `price` is added for each leaf block, and to each
@@ -97,7 +90,8 @@ enum Content {
 /// Source: \[Wald08\] for the wide tree, \[Ylitie17\], 3.1, for the dynamic program.
 pub(crate) fn choose<const W: usize>(
     nodes: &[BvhNode],
-    shapes: &Shapes,
+    ids: &[u32],
+    shapes: &mut Shapes,
     areas: Areas,
     price: f32,
     choices: &mut [u64],
@@ -110,14 +104,14 @@ pub(crate) fn choose<const W: usize>(
         let (mut left_leaf, mut right_leaf) = (nothing, nothing);
         // What was decided last is left.
         let left = if left.is_leaf() {
-            left_leaf.set_leaf(left, shapes, areas, price)?;
+            left_leaf.set_leaf(left, ids, shapes, areas, price)?;
             &left_leaf
         } else {
             pending = usize::checked_sub(pending, 1)?;
             stack.get(pending)?
         };
         let right = if right.is_leaf() {
-            right_leaf.set_leaf(right, shapes, areas, price)?;
+            right_leaf.set_leaf(right, ids, shapes, areas, price)?;
             &right_leaf
         } else {
             pending = usize::checked_sub(pending, 1)?;
@@ -139,7 +133,8 @@ impl<const W: usize> Decided<W> {
     fn set_leaf(
         &mut self,
         node: &BvhNode,
-        shapes: &Shapes,
+        ids: &[u32],
+        shapes: &mut Shapes,
         areas: Areas,
         price: f32,
     ) -> Option<()> {
@@ -151,14 +146,13 @@ impl<const W: usize> Decided<W> {
             self.content = Content::Spheres { count };
             return Some(());
         }
-        let mut corners = Corners::NONE;
         let first = node.first as usize;
-        for id in shapes.ids.get(first..first + count)? {
-            if let Shape::Triangle(triangle) = shape(shapes.scene, shapes.geometries, *id)? {
-                // Five triangles always fit.
-                triangle.into_iter().for_each(|vertex| _ = corners.add(vertex));
-            }
-        }
+        let triangles =
+            ids.get(first..first + count)?.iter().filter_map(|id| match shapes.get(*id)? {
+                Shape::Triangle(triangle) => Some(triangle),
+                Shape::Sphere { .. } => None,
+            });
+        let corners = Corners::of(triangles);
         self.content = Content::Triangles { count, corners };
         Some(())
     }

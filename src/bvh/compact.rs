@@ -1,11 +1,12 @@
 //! The compact layout: from a scene to binary nodes in the caller's memory.
 
+use super::How;
 use super::MAX_DEPTH;
 use super::tree::{Grown, Limits, PrimRef, gather, grow, leaf_budget};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{Packer, Survey, geometries, shape};
+use crate::prim::{Packer, Shapes, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage;
 
@@ -63,29 +64,39 @@ pub(crate) fn build(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
+    how: &How,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
     let full = Plan::new(survey, census, true)?;
     let fits = full.size <= bytes.len();
     let plan = if fits { full } else { Plan::new(survey, census, false)? };
     let short = BuildError::OutOfMemory { minimum: plan.size };
-    let node_count = grow_tree(scene, census, &plan, bytes).ok_or(short)?;
+    how.caller.done(0.1).ok_or(short)?;
+    let node_count = grow_tree(scene, census, &plan, how, bytes).ok_or(short)?;
     let counts = Counts { nodes: node_count as u32, ..plan.packing };
+    how.caller.done(0.7).ok_or(short)?;
     let triangle_blocks = pack_leaves(scene, census, &counts, bytes).ok_or(short)?;
     let counts = Counts { triangle_blocks: triangle_blocks as u32, ..counts };
     counts.seal(KIND_BVH, LAYOUT_COMPACT, census, bytes).ok_or(short)
 }
 
 /// Grows the tree and writes geometries and ids; returns the number of nodes.
-fn grow_tree(scene: &Scene, census: &Census, plan: &Plan, bytes: &mut [u8]) -> Option<usize> {
+fn grow_tree(
+    scene: &Scene,
+    census: &Census,
+    plan: &Plan,
+    how: &How,
+    bytes: &mut [u8],
+) -> Option<usize> {
     let PartsMut { geometries: table, prim_ids, nodes, rest, .. } =
         plan.growing.parts_mut(bytes)?;
     geometries(scene, table);
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
-    gather(scene, refs);
+    gather(scene, census, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-    let limits = Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false };
-    let node_count = grow(nodes, refs, &limits)?;
+    let limits =
+        Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false, effort: how.effort };
+    let node_count = grow(nodes, refs, &limits, how.caller)?;
     // Triangles first, then spheres, each in the order of the leaves.
     let kinds = [false, true];
     let kinds =
@@ -104,11 +115,11 @@ fn pack_leaves(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]
     let (triangles, spheres) = prim_ids.split_at(census.triangle_count as usize);
     let (mut triangles, mut spheres) = (triangles.iter(), spheres.iter());
     let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    let mut shapes = Shapes::new(scene, geometries);
     for_each_leaf(nodes, |node| {
         let (count, is_sphere) = Grown::of(node);
         let ids = if is_sphere { &mut spheres } else { &mut triangles };
-        let shapes = ids.take(count).filter_map(|id| shape(scene, geometries, *id));
-        let leaf = packer.push_leaf(shapes)?;
+        let leaf = packer.push_leaf(ids.take(count).filter_map(|id| shapes.get(*id)))?;
         node.first = leaf.block;
         node.lanes = leaf.lanes;
         Some(())

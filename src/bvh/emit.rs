@@ -180,10 +180,13 @@ struct Content {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bvh::collapse::{Shapes, choose};
+    use crate::bvh::bins::Effort;
+    use crate::bvh::collapse::choose;
     use crate::bvh::split::Areas;
     use crate::bvh::tree::{Limits, PrimRef, grow};
+    use crate::caller::Caller;
     use crate::math::Aabb;
+    use crate::prim::Shapes;
     use crate::scene::Scene;
     use std::vec::Vec;
 
@@ -205,8 +208,15 @@ mod tests {
             })
             .collect();
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * LEAVES];
-        let limits = Limits { leaves: LEAVES, leaf_max: 1, mixed: false, deep: true };
-        assert_eq!(grow(&mut nodes, &mut refs, &limits), Some(2 * LEAVES));
+        let limits = Limits {
+            leaves: LEAVES,
+            leaf_max: 1,
+            mixed: false,
+            deep: true,
+            effort: Effort::BALANCED,
+        };
+        let caller = &Caller::new(None, None);
+        assert_eq!(grow(&mut nodes, &mut refs, &limits, caller), Some(2 * LEAVES));
         for node in nodes.iter_mut().filter(|node| node.is_leaf()) {
             node.lanes = spheres | 1 << 8;
         }
@@ -273,8 +283,9 @@ mod tests {
 
     fn chosen<const W: usize>(nodes: &[BvhNode]) -> f32 {
         let mut choices = [0; LEAVES - 1];
-        let shapes = Shapes { scene: &Scene::new(&[], &[]), geometries: &[], ids: &[] };
-        choose::<W>(nodes, &shapes, areas(), PRICE, &mut choices).expect("a tree");
+        let scene = Scene::new(&[], &[]);
+        let shapes = &mut Shapes::new(&scene, &[]);
+        choose::<W>(nodes, &[], shapes, areas(), PRICE, &mut choices).expect("a tree");
         let area = |node: u32| areas().of(&nodes[node as usize].aabb());
         let mut sum = area(0) + PRICE * (28 * W) as f32 / 256.0;
         Chosen { nodes, choices: &choices, ids: &[] }

@@ -1,41 +1,78 @@
 //! Whether triangles fit into one leaf block: at most 16, over at most 16 vertices of distinct bits.
 
-use crate::block::leaf::TRIANGLES;
+use crate::block::leaf::{TRIANGLES, low_bits};
 
-/// The distinct vertices of a few triangles, as bits.
+/// The distinct vertices of a few triangles.
 #[derive(Clone, Copy)]
 pub(crate) struct Corners {
-    bits: [[u32; TRIANGLES]; 3],
+    vertices: [[f32; TRIANGLES]; 3],
     count: usize,
 }
 
 impl Corners {
-    pub const NONE: Corners = Corners { bits: [[0; TRIANGLES]; 3], count: 0 };
+    pub const NONE: Corners = Corners { vertices: [[0.0; TRIANGLES]; 3], count: 0 };
 
-    /// Adds a vertex unless it is there; false when it would be the seventeenth.
-    pub fn add(&mut self, vertex: [f32; 3]) -> bool {
-        self.add_bits(vertex.map(f32::to_bits))
+    /// Those of a few triangles, five at the most, which always fit.
+    pub fn of(triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Corners {
+        let mut all = Corners::NONE;
+        for (i, vertex) in triangles.flatten().take(TRIANGLES).enumerate() {
+            all.set(i, vertex);
+            all.count = i + 1;
+        }
+        // All are there before the first is looked for: what was just written is slow to search.
+        let mut distinct = Corners::NONE;
+        for i in 0..all.count {
+            let vertex = all.get(i);
+            if all.find(i, &vertex) == 0 {
+                distinct.set(distinct.count, vertex);
+                distinct.count += 1;
+            }
+        }
+        distinct
     }
 
     /// Adds the vertices of `other`; false when there would be more than 16.
     pub fn merge(&mut self, other: &Corners) -> bool {
-        (0..other.count.min(TRIANGLES)).all(|i| self.add_bits(other.bits.map(|axis| axis[i])))
-    }
-
-    fn add_bits(&mut self, vertex: [u32; 3]) -> bool {
-        let [x, y, z] = &self.bits;
-        let same = |i: usize| x[i] == vertex[0] && y[i] == vertex[1] && z[i] == vertex[2];
-        if (0..self.count.min(TRIANGLES)).any(same) {
-            return true;
-        }
-        if self.count >= TRIANGLES {
+        // The other's differ from each other, so what is added need not be searched; and nothing is
+        // added before the last was looked for, as above.
+        let is_new = |i: &usize| self.find(self.count, &other.get(*i)) == 0;
+        let new = (0..other.count).filter(is_new).fold(0u32, |bits, i| bits | 1 << i);
+        if self.count + new.count_ones() as usize > TRIANGLES {
             return false;
         }
-        for (axis, bits) in self.bits.iter_mut().zip(vertex) {
-            axis[self.count] = bits;
+        for i in (0..other.count).filter(|i| new >> i & 1 == 1) {
+            self.set(self.count, other.get(i));
+            self.count += 1;
         }
-        self.count += 1;
         true
+    }
+
+    fn get(&self, i: usize) -> [f32; 3] {
+        let [x, y, z] = &self.vertices;
+        [x[i % TRIANGLES], y[i % TRIANGLES], z[i % TRIANGLES]]
+    }
+
+    fn set(&mut self, i: usize, vertex: [f32; 3]) {
+        for (axis, x) in self.vertices.iter_mut().zip(vertex) {
+            axis[i % TRIANGLES] = x;
+        }
+    }
+
+    /// Which of the first `count` vertices have just these bits, one bit each. All are compared, without
+    /// a branch: that is a few vector instructions.
+    #[inline]
+    fn find(&self, count: usize, vertex: &[f32; 3]) -> u32 {
+        let ([xs, ys, zs], [x, y, z]) = (&self.vertices, vertex.map(f32::to_bits));
+        // Rows of four, as most machines have vectors of four.
+        let mut rows = [0u32; 4];
+        for first in (0..count.min(TRIANGLES)).step_by(4) {
+            for (lane, row) in rows.iter_mut().enumerate() {
+                let i = (first + lane) % TRIANGLES;
+                let differs = (xs[i].to_bits() ^ x) | (ys[i].to_bits() ^ y) | (zs[i].to_bits() ^ z);
+                *row |= if differs == 0 { 1 << i } else { 0 };
+            }
+        }
+        (rows[0] | rows[1] | rows[2] | rows[3]) & low_bits(count as u32)
     }
 }
 
@@ -43,16 +80,29 @@ impl Corners {
 mod tests {
     use super::*;
 
+    fn triangles(vertices: &[[f32; 3]]) -> impl Iterator<Item = [[f32; 3]; 3]> {
+        vertices.chunks_exact(3).map(|v| [v[0], v[1], v[2]])
+    }
+
     #[test]
     fn sixteen_vertices_fit_and_equal_bits_count_once() {
-        let mut corners = Corners::NONE;
-        assert!((0..16).all(|i| corners.add([i as f32, 0.0, 1.0])));
-        assert!(corners.add([3.0, 0.0, 1.0]), "known");
-        assert!(!corners.clone().add([3.0, -0.0, 1.0]), "other bits");
-        assert!(!corners.clone().add([3.0, 0.0, 2.0]), "the seventeenth");
-        let mut known = Corners::NONE;
-        assert!(known.merge(&corners) && known.merge(&corners) && known.count == 16);
-        let mut one = Corners::NONE;
-        assert!(one.add([9.5, 0.0, 0.0]) && !one.merge(&corners));
+        let vertex = |i: usize| [i as f32, 0.0, 1.0];
+        let fifteen: [_; 15] = core::array::from_fn(vertex);
+        let mut corners = Corners::of(triangles(&fifteen));
+        let one = |extra| Corners::of(triangles(&[extra, vertex(3), vertex(4)]));
+        assert!(corners.merge(&corners.clone()) && corners.count == 15);
+        assert!(corners.merge(&one(vertex(15))) && corners.count == 16);
+        assert!(corners.merge(&one(vertex(15))), "known");
+        assert!(!corners.clone().merge(&one([3.0, -0.0, 1.0])), "other bits");
+        assert!(!corners.clone().merge(&one([3.0, 0.0, 2.0])), "the seventeenth");
+        let twice = Corners::of(triangles(&[
+            vertex(1),
+            vertex(2),
+            vertex(3),
+            vertex(3),
+            vertex(1),
+            vertex(4),
+        ]));
+        assert_eq!(twice.count, 4);
     }
 }

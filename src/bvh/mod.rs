@@ -1,18 +1,23 @@
 //! A bounding volume hierarchy over the leaf blocks, in two forms: a binary tree of 32-byte nodes, or a
 //! tree of bundles.
 
+mod bins;
 mod collapse;
 mod compact;
 mod emit;
 mod fits;
 mod split;
 mod stack;
+mod sweep;
 mod traverse;
 mod tree;
 mod validate;
 mod wide;
 mod wide_build;
 
+use crate::caller::Caller;
+
+pub(crate) use bins::Effort;
 pub(crate) use compact::{build, needs};
 pub(crate) use traverse::traverse;
 pub(crate) use validate::{bundles_are_sound, tree_is_sound};
@@ -25,3 +30,9 @@ pub(crate) use wide_build::{build_wide, needs_wide};
 /// depth; `2^30` primitives halve 28 times to leaves of five, and one level parts kinds. A bundle
 /// takes the place of one binary node at least, so a tree of bundles is no deeper.
 const MAX_DEPTH: usize = 64;
+
+/// How a tree is built.
+pub(crate) struct How<'a> {
+    pub effort: Effort,
+    pub caller: &'a Caller<'a>,
+}

@@ -1,12 +1,15 @@
-//! Binned SAH: the tree over boxes, before there are leaf blocks.
+//! The binary tree over boxes, before there are leaf blocks.
 
 #![allow(unsafe_code, reason = "a promise about the layout drawn here")]
 
 use super::MAX_DEPTH;
-use super::split::{Areas, Bins, Box4, Extent, best_plane};
-use crate::block::BvhNode;
+use super::bins::{Bins, Effort, best_plane};
+use super::split::{Areas, Box4, Extent};
+use super::sweep::{FEW, sweep};
+use crate::block::{BvhNode, Census};
+use crate::caller::Caller;
 use crate::math::Aabb;
-use crate::prim::{Shape, for_each_prim};
+use crate::prim::{Shape, for_each_prim_in};
 use crate::scene::Scene;
 use crate::storage::Plain;
 
@@ -17,8 +20,8 @@ use crate::storage::Plain;
 ///      | lower | id | upper | is sphere |
 /// ```
 ///
-/// The numbers stand in the fourth lanes of the box. They are below `2^30`, so as floats they are
-/// numbers too.
+/// The id stands in the fourth lane of the box, below `2^30` and with that bit set. So all lanes are
+/// zero or normal floats: computing with subnormal ones is slow.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(crate) struct PrimRef {
@@ -33,17 +36,26 @@ impl PrimRef {
     /// Where the id is among the words of a ref.
     pub const ID: usize = 3;
 
+    /// Set in that word.
+    const NORMAL: u32 = 1 << 30;
+
+    /// The id in that word.
+    pub fn id_of(word: u32) -> u32 {
+        word & !Self::NORMAL
+    }
+
     pub fn new(id: u32, aabb: &Aabb, sphere: bool) -> Self {
         let lane = |[x, y, z]: [f32; 3], word: u32| {
             // -0 becomes +0.
             [x + 0.0, y + 0.0, z + 0.0, f32::from_bits(word)]
         };
-        let (lower, upper) = (lane(aabb.lower, id), lane(aabb.upper, sphere.into()));
+        let sphere = if sphere { 1.0f32.to_bits() } else { 0 };
+        let (lower, upper) = (lane(aabb.lower, id | Self::NORMAL), lane(aabb.upper, sphere));
         PrimRef { bounds: Box4 { lower, upper } }
     }
 
     pub fn id(&self) -> u32 {
-        self.bounds.lower[3].to_bits()
+        Self::id_of(self.bounds.lower[3].to_bits())
     }
 
     pub fn is_sphere(&self) -> bool {
@@ -52,9 +64,9 @@ impl PrimRef {
 }
 
 /// Writes a ref for each primitive that can be hit.
-pub(crate) fn gather(scene: &Scene, refs: &mut [PrimRef]) {
+pub(crate) fn gather(scene: &Scene, census: &Census, refs: &mut [PrimRef]) {
     let mut free = refs.iter_mut();
-    for_each_prim(scene, |prim| {
+    for_each_prim_in(scene, 0..u32::MAX, census.ignored_count == 0, |prim| {
         if let Some(r) = free.next() {
             let sphere = matches!(prim.shape, Shape::Sphere { .. });
             *r = PrimRef::new(prim.id, &prim.shape.aabb(), sphere);
@@ -89,6 +101,8 @@ pub(crate) struct Limits {
     pub mixed: bool,
     /// Whether to split as long as the leaves last, and not as long as it pays.
     pub deep: bool,
+    /// How carefully planes are chosen.
+    pub effort: Effort,
 }
 
 /// Cost of a step to two children, in tests of one primitive.
@@ -98,6 +112,8 @@ const STEP_COST: f32 = 2.0;
 #[derive(Clone, Copy)]
 struct Task {
     node: u32,
+    /// Where the nodes below it begin.
+    pairs: u32,
     first: usize,
     count: usize,
     depth: usize,
@@ -147,54 +163,188 @@ fn levels_to_halve(count: usize, leaf_max: usize) -> usize {
 /// Nodes are laid out as [`tree_is_sound`](super::tree_is_sound) expects them; leaves are
 /// [`Grown`] until they are packed. `nodes` has two entries for each leaf of `budget`.
 ///
+/// A few large splits part the tree into branches, which grow independently: each in the place that its
+/// budget of leaves reserves for it, so that the tree is the same in whatever order they grow. The
+/// places that stay free are closed at the end.
+///
 /// Source: \[Wald07\], with leaves limited in number as the memory is.
-pub(crate) fn grow(nodes: &mut [BvhNode], refs: &mut [PrimRef], limits: &Limits) -> Option<usize> {
-    let budget = limits.leaves;
+pub(crate) fn grow(
+    nodes: &mut [BvhNode],
+    refs: &mut [PrimRef],
+    limits: &Limits,
+    caller: &Caller,
+) -> Option<usize> {
     let extent = Extent::around(refs);
     let areas = Areas::new(&extent.bounds.aabb());
-    let mut bins = Bins::EMPTY;
-    let mut stack =
-        [Task { node: 0, first: 0, count: refs.len(), depth: 0, budget, extent }; MAX_DEPTH];
-    let mut pending = 1;
-    let mut used = 2;
-    while pending > 0 {
-        pending -= 1;
-        let task = stack[pending];
-        let range = refs.get_mut(task.first..task.first + task.count)?;
-        let node = nodes.get_mut(task.node as usize)?;
-        let Some(split) = part(range, &task, limits, areas, &mut bins) else {
-            *node = Grown::leaf(&task.extent.bounds.aabb(), task.first, range);
-            continue;
-        };
-        *node = BvhNode::inner(&task.extent.bounds.aabb(), used);
-        let right_count = task.count - split.left_count;
-        let left_budget = share(&task, &split);
-        let children = [
-            Task {
-                node: used + 1,
-                first: task.first + split.left_count,
-                count: right_count,
-                depth: task.depth + 1,
-                budget: task.budget - left_budget,
-                extent: split.sides[1],
-            },
-            Task {
-                node: used,
-                first: task.first,
-                count: split.left_count,
-                depth: task.depth + 1,
-                budget: left_budget,
-                extent: split.sides[0],
-            },
-        ];
-        used += 2;
-        // The left child is taken next, so its subtree is stored before the right one's.
-        for child in children {
-            *stack.get_mut(pending)? = child;
-            pending += 1;
-        }
+    let splitter = Splitter { limits, areas };
+    let root = Task {
+        node: 0,
+        pairs: 2,
+        first: 0,
+        count: refs.len(),
+        depth: 0,
+        budget: limits.leaves,
+        extent,
+    };
+    let mut tasks = [root; BRANCHES];
+    let count = splitter.branch_out(nodes, refs, &mut tasks)?;
+    let tasks = &tasks[..count];
+    let mut branches: [Option<Branch>; BRANCHES] = [const { None }; BRANCHES];
+    let (mut free_nodes, mut free_refs) = (&mut *nodes, refs);
+    let (mut at_node, mut at_ref) = (0, 0);
+    for (task, branch) in tasks.iter().zip(&mut branches) {
+        let (first, room) = (task.pairs as usize, 2 * (task.budget - 1));
+        let rest = core::mem::take(&mut free_nodes).split_at_mut_checked(first - at_node)?.1;
+        let (nodes, rest) = rest.split_at_mut_checked(room)?;
+        (free_nodes, at_node) = (rest, first + room);
+        let rest = core::mem::take(&mut free_refs).split_at_mut_checked(task.first - at_ref)?.1;
+        let (refs, rest) = rest.split_at_mut_checked(task.count)?;
+        (free_refs, at_ref) = (rest, task.first + task.count);
+        *branch = Some(Branch { task: *task, nodes, refs, root: None });
     }
-    Some(used as usize)
+    caller.for_each(&mut branches[..count], |branch| {
+        if let Some(branch) = branch {
+            branch.root = splitter.grow_branch(branch);
+        }
+    });
+    let mut roots = [BvhNode::inner(&Aabb::EMPTY, 0); BRANCHES];
+    for (root, branch) in roots.iter_mut().zip(branches.iter().flatten()) {
+        *root = branch.root?;
+    }
+    for (task, root) in tasks.iter().zip(roots) {
+        *nodes.get_mut(task.node as usize)? = root;
+    }
+    close_gaps(nodes)
+}
+
+/// Branches at most. How many there are must not depend on the threads, as the tree must not.
+const BRANCHES: usize = 64;
+/// Branches of fewer refs are not parted further.
+const BRANCH: usize = 2048;
+
+/// A subtree of its own, with its place.
+struct Branch<'b> {
+    task: Task,
+    nodes: &'b mut [BvhNode],
+    refs: &'b mut [PrimRef],
+    /// Its root, when it has grown.
+    root: Option<BvhNode>,
+}
+
+/// How nodes are split.
+#[derive(Clone, Copy)]
+struct Splitter<'l> {
+    limits: &'l Limits,
+    areas: Areas,
+}
+
+impl Splitter<'_> {
+    /// Splits the largest task again and again, until there are enough or all are small; returns their
+    /// number. They stay in the order of the tree.
+    fn branch_out(
+        self,
+        nodes: &mut [BvhNode],
+        refs: &mut [PrimRef],
+        tasks: &mut [Task; BRANCHES],
+    ) -> Option<usize> {
+        let grain = (refs.len() / 48).max(BRANCH);
+        let mut bins = Bins::EMPTY;
+        let mut count = 1;
+        while count < BRANCHES {
+            let largest = (0..count).rev().max_by_key(|i| tasks[*i].count)?;
+            let task = tasks[largest];
+            if task.count <= grain {
+                break;
+            }
+            let range = refs.get_mut(task.first..task.first + task.count)?;
+            // More than a leaf, so it is split.
+            let split = self.part(range, &task, &mut bins)?;
+            let node = nodes.get_mut(task.node as usize)?;
+            *node = BvhNode::inner(&task.extent.bounds.aabb(), task.pairs);
+            let [left, right] = task.children(&split, task.pairs);
+            tasks.copy_within(largest + 1..count, largest + 2);
+            tasks[largest] = left;
+            tasks[largest + 1] = right;
+            count += 1;
+        }
+        Some(count)
+    }
+
+    /// Grows a branch; returns its root.
+    fn grow_branch(self, branch: &mut Branch) -> Option<BvhNode> {
+        let Branch { task: whole, nodes, refs, .. } = branch;
+        let mut root = None;
+        let mut bins = Bins::EMPTY;
+        let mut stack = [*whole; MAX_DEPTH];
+        let mut pending = 1;
+        let mut used = whole.pairs;
+        while pending > 0 {
+            pending -= 1;
+            let task = stack[pending];
+            let first = task.first - whole.first;
+            let range = refs.get_mut(first..first + task.count)?;
+            let split = self.part(range, &task, &mut bins);
+            let aabb = task.extent.bounds.aabb();
+            let node = match &split {
+                None => Grown::leaf(&aabb, task.first, range),
+                Some(_) => BvhNode::inner(&aabb, used),
+            };
+            match task.node.checked_sub(whole.pairs) {
+                Some(place) if task.depth > whole.depth => *nodes.get_mut(place as usize)? = node,
+                _ => root = Some(node),
+            }
+            let Some(split) = split else { continue };
+            let [left, right] = task.children(&split, used);
+            used += 2;
+            // The left child is taken next, so its subtree is stored before the right one's.
+            for child in [right, left] {
+                *stack.get_mut(pending)? = child;
+                pending += 1;
+            }
+        }
+        root
+    }
+}
+
+impl Task {
+    /// The tasks of the sides, whose nodes are the pair at `pair`.
+    fn children(&self, split: &Split, pair: u32) -> [Task; 2] {
+        let depth = self.depth + 1;
+        let (count, budget) = (split.left_count, share(self, split));
+        let [left, right] = split.sides;
+        let (first, pairs) = (self.first, pair + 2);
+        let left = Task { node: pair, pairs, first, count, depth, budget, extent: left };
+        // A subtree has a pair for each of its leaves but one.
+        let pairs = pairs + 2 * (budget as u32).saturating_sub(1);
+        let (first, count) = (first + count, self.count - count);
+        let budget = self.budget - budget;
+        [left, Task { node: pair + 1, pairs, first, count, depth, budget, extent: right }]
+    }
+}
+
+/// Moves pairs of children down to where the one before ends; returns the number of nodes.
+fn close_gaps(nodes: &mut [BvhNode]) -> Option<usize> {
+    let mut stack = [0u32; MAX_DEPTH];
+    let (mut pending, mut used, mut at) = (0, 2, 0u32);
+    loop {
+        let node = nodes.get_mut(at as usize)?;
+        if node.is_leaf() {
+            if pending == 0 {
+                return Some(used as usize);
+            }
+            pending -= 1;
+            at = stack[pending];
+            continue;
+        }
+        let pair = node.first as usize;
+        node.first = used;
+        // Pairs lie in the order of this walk, so the place is this pair's own, or one moved before.
+        nodes.copy_within(pair..pair + 2, used as usize);
+        *stack.get_mut(pending)? = used + 1;
+        pending += 1;
+        at = used;
+        used += 2;
+    }
 }
 
 /// The leaves that the left child may have: its share by count, but enough for either side.
@@ -205,47 +355,62 @@ fn share(task: &Task, split: &Split) -> usize {
     fair.clamp(least, most).min(task.budget)
 }
 
-/// Parts the refs of a node in two, or decides for a leaf.
-fn part(
-    refs: &mut [PrimRef],
-    task: &Task,
-    limits: &Limits,
-    areas: Areas,
-    bins: &mut Bins,
-) -> Option<Split> {
-    let Limits { leaf_max, mixed, deep, .. } = *limits;
-    let count = refs.len();
-    let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
-    let one_kind = !mixed || spheres == 0 || spheres == count;
-    let may_be_leaf = count <= leaf_max && one_kind;
-    if may_be_leaf && (count == 1 || task.budget < 2) {
-        return None;
-    }
-    let least = |left_count: usize| {
-        [fewest_leaves(left_count, mixed), fewest_leaves(count - left_count, mixed)]
-    };
-    let pays = |work: f32| {
-        let area = areas.of(&task.extent.bounds.aabb());
-        // Everything on one line or in one point: any split is as good as another.
-        STEP_COST * area + work < area * count as f32 || area == 0.0
-    };
-    let plane = best_plane(refs, &task.extent, areas, bins);
-    let sah = plane.filter(|plane| !may_be_leaf || deep || pays(plane.work)).and_then(|plane| {
-        let left_count = plane.part(refs);
-        let least = least(left_count);
-        let levels = levels_to_halve(left_count.max(count - left_count), leaf_max);
-        let lasts = least[0] + least[1] <= task.budget && task.depth + 1 + levels < MAX_DEPTH;
-        lasts.then(|| split_at(refs, left_count, least))
-    });
-    match sah {
-        Some(split) => Some(split),
-        None if may_be_leaf => None,
-        // Few, but of two kinds: each kind can be one leaf.
-        None if count <= leaf_max => {
-            refs.sort_unstable_by_key(|r| (r.is_sphere(), r.id()));
-            Some(split_at(refs, count - spheres, [1, 1]))
+impl Splitter<'_> {
+    /// Parts the refs of a node in two, or decides for a leaf.
+    fn part(self, refs: &mut [PrimRef], task: &Task, bins: &mut Bins) -> Option<Split> {
+        let (Limits { leaf_max, mixed, deep, effort, .. }, areas) = (*self.limits, self.areas);
+        let count = refs.len();
+        let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
+        let one_kind = !mixed || spheres == 0 || spheres == count;
+        let may_be_leaf = count <= leaf_max && one_kind;
+        if may_be_leaf && (count == 1 || task.budget < 2) {
+            return None;
         }
-        None => Some(split_at(refs, count / 2, least(count / 2))),
+        let least = |left_count: usize| {
+            [fewest_leaves(left_count, mixed), fewest_leaves(count - left_count, mixed)]
+        };
+        let pays = |work: f32| {
+            let area = areas.of(&task.extent.bounds.aabb());
+            // Everything on one line or in one point: any split is as good as another.
+            STEP_COST * area + work < area * count as f32 || area == 0.0
+        };
+        let lasts = |left_count: usize| {
+            let [left, right] = least(left_count);
+            let levels = levels_to_halve(left_count.max(count - left_count), leaf_max);
+            left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
+        };
+        let sah = if count <= FEW {
+            let sweep = sweep(refs, areas, lasts).filter(|s| !may_be_leaf || deep || pays(s.work));
+            sweep.map(|s| Split {
+                left_count: s.left_count,
+                least: least(s.left_count),
+                sides: s.sides,
+            })
+        } else {
+            // The box of the centres is a guess; when all are in one bin of it, it is looked for.
+            let exact = |bins| best_plane(refs, &Extent::around(refs).centres, areas, effort, bins);
+            let plane =
+                best_plane(refs, &task.extent.centres, areas, effort, bins).or_else(|| exact(bins));
+            plane.and_then(|plane| {
+                let left_count = plane.part(refs);
+                let sides = || plane.sides(refs, left_count, &task.extent.centres);
+                lasts(left_count).then(|| Split {
+                    left_count,
+                    least: least(left_count),
+                    sides: sides(),
+                })
+            })
+        };
+        match sah {
+            Some(split) => Some(split),
+            None if may_be_leaf => None,
+            // Few, but of two kinds: each kind can be one leaf.
+            None if count <= leaf_max => {
+                refs.sort_unstable_by_key(|r| (r.is_sphere(), r.id()));
+                Some(split_at(refs, count - spheres, [1, 1]))
+            }
+            None => Some(split_at(refs, count / 2, least(count / 2))),
+        }
     }
 }
 
@@ -309,8 +474,10 @@ mod tests {
                 let leaves = leaf_budget(count, false, true);
                 let mut refs = series(count, ratio);
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
-                let limits = Limits { leaves, leaf_max, mixed: false, deep };
-                let used = grow(&mut nodes, &mut refs, &limits).expect("room");
+                let limits =
+                    Limits { leaves, leaf_max, mixed: false, deep, effort: Effort::BALANCED };
+                let used =
+                    grow(&mut nodes, &mut refs, &limits, &Caller::new(None, None)).expect("room");
                 let levels = levels(&nodes[..used]);
                 assert!(levels <= MAX_DEPTH, "{ratio} {leaf_max}: {levels}");
                 deepest = deepest.max(levels);

@@ -1,6 +1,7 @@
 //! The wide layouts: from a scene to bundles in the caller's memory.
 
-use super::collapse::{Shapes, choose};
+use super::How;
+use super::collapse::choose;
 use super::compact;
 use super::emit::{BEGINS, Chosen, Sizes};
 use super::split::Areas;
@@ -9,7 +10,7 @@ use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{Packer, Survey, geometries, shape};
+use crate::prim::{Packer, Shapes, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT, Plain};
 
@@ -95,33 +96,38 @@ pub(crate) fn build_wide(
     survey: &Survey,
     census: &Census,
     width: u32,
+    how: &How,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
     let built = match width {
-        4 => build::<4>(scene, survey, census, bytes),
-        8 => build::<8>(scene, survey, census, bytes),
-        _ => build::<16>(scene, survey, census, bytes),
+        4 => build::<4>(scene, survey, census, how, bytes),
+        8 => build::<8>(scene, survey, census, how, bytes),
+        _ => build::<16>(scene, survey, census, how, bytes),
     };
-    built.map_or_else(
-        || {
+    match built {
+        Some(size) => Ok(size),
+        None if how.caller.cancelled() => Err(BuildError::Cancelled),
+        None => {
             bytes.fill(0);
-            compact::build(scene, survey, census, bytes)
-        },
-        Ok,
-    )
+            compact::build(scene, survey, census, how, bytes)
+        }
+    }
 }
 
 fn build<const W: usize>(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
+    how: &How,
     bytes: &mut [u8],
 ) -> Option<usize>
 where
     Bundle<W>: Plain,
 {
     let places = Places::new(survey, census, bytes.len())?;
-    let nodes = grow_tree(scene, survey, census, &places, bytes)?;
+    how.caller.done(0.1)?;
+    let nodes = grow_tree(scene, survey, census, &places, how, bytes)?;
+    how.caller.done(0.6)?;
     let scratch = Scratch::new(census, &places, nodes)?;
     let prims = census.hittable();
     let areas = Areas::new(&census.bounds);
@@ -132,6 +138,7 @@ where
         let counts = counts(survey, census, &sizes, W as u32);
         let at = counts.offsets()?;
         if at.words <= scratch.choices && at.end <= bytes.len() {
+            how.caller.done(0.85)?;
             scratch.emit::<W>(census, &counts, bytes)?;
             pack(scene, census, &counts, bytes)?;
             return counts.seal(KIND_BVH, W as u32, census, bytes);
@@ -146,6 +153,7 @@ fn grow_tree(
     survey: &Survey,
     census: &Census,
     places: &Places,
+    how: &How,
     bytes: &mut [u8],
 ) -> Option<usize> {
     let front = Counts { geometries: survey.geometry_count, ..Counts::default() };
@@ -154,14 +162,15 @@ fn grow_tree(
     let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
     let refs = storage::view_mut::<PrimRef>(front, places.refs, prims)?;
-    gather(scene, refs);
+    gather(scene, census, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-    let limits = Limits { leaves: places.leaves, leaf_max: LEAF_MAX, mixed, deep: true };
-    let count = grow(nodes, refs, &limits)?;
+    let limits =
+        Limits { leaves: places.leaves, leaf_max: LEAF_MAX, mixed, deep: true, effort: how.effort };
+    let count = grow(nodes, refs, &limits, how.caller)?;
     // From the last on, each id goes to the end of the refs' place, onto refs that are done.
     let words = storage::view_mut::<u32>(front, places.refs, 8 * prims)?;
     for i in (0..prims).rev() {
-        words[7 * prims + i] = words[8 * i + PrimRef::ID];
+        words[7 * prims + i] = PrimRef::id_of(words[8 * i + PrimRef::ID]);
     }
     Some(count)
 }
@@ -200,7 +209,7 @@ impl Scratch {
         let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
         let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
         let geometries = table.parts_mut(front)?.geometries;
-        choose::<W>(nodes, &Shapes { scene, geometries, ids }, areas, price, choices)?;
+        choose::<W>(nodes, ids, &mut Shapes::new(scene, geometries), areas, price, choices)?;
         Chosen { nodes, choices, ids }.sizes::<W>()
     }
 
@@ -226,12 +235,13 @@ fn pack(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Op
     let PartsMut { geometries, prim_ids, sphere_blocks, triangle_blocks, .. } =
         counts.parts_mut(bytes)?;
     let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    let mut shapes = Shapes::new(scene, geometries);
     for id in prim_ids {
         if *id & BEGINS != 0 {
             packer.close();
         }
         *id &= !BEGINS;
-        packer.push(&shape(scene, geometries, *id)?)?;
+        packer.push(&shapes.get(*id)?)?;
     }
     (packer.triangle_block_count() == counts.triangle_blocks as usize).then_some(())
 }

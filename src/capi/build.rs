@@ -2,20 +2,17 @@
 
 use core::mem::MaybeUninit;
 
+use super::lender::Lender;
 use super::scene::CheckedScene;
 use super::status::{Error, RtStatus};
 use super::types::{
-    RT_KIND_BVH, RT_KIND_GRID, RT_KIND_LIST, RT_LAYOUT_AUTOMATIC, RT_LAYOUT_COMPACT,
-    RT_LAYOUT_WIDE_4, RT_LAYOUT_WIDE_8, RT_LAYOUT_WIDE_16, RT_PLAIN_LIST_ALWAYS,
-    RT_PLAIN_LIST_AUTOMATIC, RT_PLAIN_LIST_NEVER, RT_QUALITY_BALANCED, RT_QUALITY_BEST,
-    RT_QUALITY_FAST, RtAccel, RtBuildOptions, RtInfo, RtMemory, RtScene,
+    RT_KIND_BVH, RT_KIND_GRID, RT_KIND_LIST, RT_LAYOUT_COMPACT, RtAccel, RtBuildOptions, RtInfo,
+    RtMemory, RtScene,
 };
-use super::versioned::{self, Output, pointer};
+use super::versioned::{Output, pointer};
 use super::{accel_at, guard};
 use crate::accel::{Accel, Info, Kind, Layout};
-use crate::build::{
-    BuildOptions, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
-};
+use crate::build::{BuildOptions, Memory, build_bvh, build_grid, bvh_needs, grid_needs};
 use crate::error::BuildError;
 use crate::scene::Scene;
 use crate::storage::ALIGNMENT;
@@ -222,7 +219,9 @@ unsafe fn needs(
     // SAFETY: the caller's promise.
     let scene = unsafe { CheckedScene::new(scene) }?;
     // SAFETY: the caller's promise.
-    let options = unsafe { build_options(options) }?;
+    let lender = unsafe { Lender::read(options) }?;
+    let progress = lender.progress();
+    let options = lender.options(&progress)?;
     let out = pointer(out)?;
     let Memory { size, minimum, alignment } = needs(&Scene::foreign(&scene), &options)?;
     // SAFETY: not null, aligned, and valid as the caller promises.
@@ -244,7 +243,9 @@ unsafe fn build(
     // SAFETY: the caller's promise.
     let scene = unsafe { CheckedScene::new(scene) }?;
     // SAFETY: the caller's promise.
-    let options = unsafe { build_options(options) }?;
+    let lender = unsafe { Lender::read(options) }?;
+    let progress = lender.progress();
+    let options = lender.options(&progress)?;
     let memory = pointer(memory)?;
     let out = pointer(out)?;
     // A slice cannot be longer, and no build needs more.
@@ -255,51 +256,6 @@ unsafe fn build(
     // SAFETY: not null, aligned, and valid as the caller promises.
     unsafe { out.write(accel.block().as_ptr().cast()) };
     Ok(())
-}
-
-/// The options at `options`, or the default ones for null.
-///
-/// # Safety
-///
-/// `options` is null or valid.
-unsafe fn build_options(options: *const RtBuildOptions) -> Result<BuildOptions, Error> {
-    if options.is_null() {
-        return Ok(BuildOptions::default());
-    }
-    // SAFETY: the caller's promise.
-    unsafe { versioned::read(options) }?.checked()
-}
-
-impl RtBuildOptions {
-    fn checked(&self) -> Result<BuildOptions, Error> {
-        let quality = match self.quality {
-            RT_QUALITY_BALANCED => Quality::Balanced,
-            RT_QUALITY_FAST => Quality::Fast,
-            RT_QUALITY_BEST => Quality::Best,
-            _ => return Err(Error::InvalidArgument),
-        };
-        let layout = match self.layout {
-            RT_LAYOUT_AUTOMATIC => Layout::Automatic,
-            RT_LAYOUT_COMPACT => Layout::Compact,
-            RT_LAYOUT_WIDE_4 | RT_LAYOUT_WIDE_8 | RT_LAYOUT_WIDE_16 => Layout::Wide(self.layout),
-            _ => return Err(Error::InvalidArgument),
-        };
-        let refit = match self.refit {
-            0 => false,
-            1 => true,
-            _ => return Err(Error::InvalidArgument),
-        };
-        let plain_list = match self.plain_list {
-            RT_PLAIN_LIST_AUTOMATIC => PlainList::Automatic,
-            RT_PLAIN_LIST_NEVER => PlainList::Never,
-            RT_PLAIN_LIST_ALWAYS => PlainList::Always,
-            _ => return Err(Error::InvalidArgument),
-        };
-        if self.parallel_for.is_some() || self.progress.is_some() {
-            return Err(Error::Unsupported);
-        }
-        Ok(BuildOptions { quality, layout, refit, plain_list })
-    }
 }
 
 impl RtInfo {

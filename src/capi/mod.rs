@@ -5,6 +5,7 @@
 
 mod build;
 mod control;
+mod lender;
 mod query;
 mod scene;
 mod status;

@@ -44,6 +44,8 @@ pub const RT_ERROR_LAYOUT: RtStatus = 14;
 pub const RT_ERROR_NOT_FOUND: RtStatus = 15;
 /// A fault of the library, which was stopped before it reached the caller. Please report it.
 pub const RT_ERROR_INTERNAL: RtStatus = 16;
+/// `progress` returned false. The memory holds no structure and may be used again.
+pub const RT_ERROR_CANCELLED: RtStatus = 17;
 
 /// Why a call was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +66,7 @@ pub(crate) enum Error {
     Layout,
     NotFound,
     Internal,
+    Cancelled,
 }
 
 impl Error {
@@ -85,6 +88,7 @@ impl Error {
             Error::Layout => RT_ERROR_LAYOUT,
             Error::NotFound => RT_ERROR_NOT_FOUND,
             Error::Internal => RT_ERROR_INTERNAL,
+            Error::Cancelled => RT_ERROR_CANCELLED,
         }
     }
 }
@@ -99,6 +103,7 @@ impl From<BuildError> for Error {
             BuildError::Misaligned => Error::Misaligned,
             BuildError::TooLarge => Error::TooLarge,
             BuildError::NoSuchLayout { .. } => Error::InvalidArgument,
+            BuildError::Cancelled => Error::Cancelled,
             BuildError::Unsupported(_) => Error::Unsupported,
         }
     }
@@ -137,6 +142,7 @@ fn message(status: RtStatus) -> &'static CStr {
         RT_ERROR_LAYOUT => c"this build of the library leaves out the block's layout",
         RT_ERROR_NOT_FOUND => c"the ray has no such hit",
         RT_ERROR_INTERNAL => c"a fault of the library was stopped",
+        RT_ERROR_CANCELLED => c"the caller cancelled the build",
         _ => c"an unknown status",
     }
 }

@@ -4,11 +4,12 @@ use core::ffi::c_void;
 
 use super::versioned::{Growing, Versioned};
 
-/// `RtBuildOptions.quality`: binned surface area heuristic.
+/// `RtBuildOptions.quality`, for a BVH: surface area heuristic over 16 bins on each axis, for large
+/// nodes by samples.
 pub const RT_QUALITY_BALANCED: u32 = 0;
-/// For a structure that is built for every frame. Unsupported so far.
+/// For a structure that is built often: the widest axis alone, fewer samples.
 pub const RT_QUALITY_FAST: u32 = 1;
-/// For a structure that is built once. Unsupported so far.
+/// For a structure that is built once: 32 bins, every primitive in them.
 pub const RT_QUALITY_BEST: u32 = 2;
 
 /// `RtBuildOptions.layout`: bundles of 16. The block says how it is read, not the machine: every
@@ -164,11 +165,13 @@ pub struct RtScene {
 pub type RtTask = Option<unsafe extern "C" fn(context: *mut c_void, index: u32)>;
 
 /// The caller's threads: calls `task(context, i)` for each `i` below `count`, in any order and on
-/// any thread, and returns when all are done. Tasks never block and never nest.
+/// any thread, and returns when all are done; `context` is dead then. Tasks never block and never
+/// nest. The block has the same bytes with any number of threads.
 pub type RtParallelFor =
     Option<unsafe extern "C" fn(user: *mut c_void, count: u32, task: RtTask, context: *mut c_void)>;
 
-/// How far a build is, from 0 to 1; false cancels it. Called on the thread that builds.
+/// How far a build is, from 0 to 1; false cancels it: RT_ERROR_CANCELLED. Called on the thread that
+/// builds, a few times a build.
 pub type RtProgress = Option<unsafe extern "C" fn(user: *mut c_void, done: f32) -> bool>;
 
 /// What a build may choose. Zero in every field but the first suits most scenes.
@@ -184,13 +187,13 @@ pub struct RtBuildOptions {
     pub refit: u32,
     /// One of `RT_PLAIN_LIST_`.
     pub plain_list: u32,
-    /// How many tasks of `parallel_for` may run at once; without it, ignored.
+    /// How many tasks of `parallel_for` may run at once; with less than two it is not called.
     pub worker_count: u32,
     /// Handed to the two calls below.
     pub user: *mut c_void,
-    /// Or null. Unsupported so far: with it a build is refused.
+    /// Or null: all is done on the calling thread. Speeds up the tree of a BVH.
     pub parallel_for: RtParallelFor,
-    /// Or null. Unsupported so far: with it a build is refused.
+    /// Or null.
     pub progress: RtProgress,
 }
 

@@ -1,12 +1,14 @@
 //! The scene as a run of flat numbers: which primitives can be hit, and where they are.
 
+use core::ops::Range;
+
 use crate::block::{Census, Geometry};
 use crate::error::BuildError;
 use crate::interval::triangle::has_area;
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
 use crate::query::geometry_of;
-use crate::scene::Scene;
+use crate::scene::{Mesh, Scene};
 
 /// Flat numbers and block references leave two bits for other uses.
 const MOST_PRIMS: usize = 1 << 30;
@@ -37,10 +39,13 @@ pub(crate) struct Survey {
 
 impl Shape {
     /// The shape, if it can be hit: finite, with area or radius.
+    #[inline]
     fn sound(self) -> Option<Shape> {
         let sound = match self {
             Shape::Triangle(corners) => {
-                corners.as_flattened().iter().all(|x| x.is_finite()) && has_area(corners)
+                // Looked at all together: a branch for each takes longer than the sum.
+                let finite = corners.as_flattened().iter().fold(true, |all, x| all & x.is_finite());
+                finite && has_area(corners)
             }
             Shape::Sphere { centre, radius } => {
                 centre.iter().all(|x| x.is_finite()) && radius.is_finite() && radius > 0.0
@@ -50,9 +55,18 @@ impl Shape {
     }
 
     /// A box around the shape; for triangles the smallest. It may be infinite for huge spheres.
+    #[inline]
     pub fn aabb(&self) -> Aabb {
         match *self {
-            Shape::Triangle(corners) => Aabb::around(&corners),
+            Shape::Triangle([a, b, c]) => {
+                // Of equal zeros the first stays, as in `Aabb::add`; but without a branch.
+                let least = |x: f32, y: f32| if y < x { y } else { x };
+                let most = |x: f32, y: f32| if y > x { y } else { x };
+                Aabb {
+                    lower: [0, 1, 2].map(|k| least(least(a[k], b[k]), c[k])),
+                    upper: [0, 1, 2].map(|k| most(most(a[k], b[k]), c[k])),
+                }
+            }
             Shape::Sphere { centre, radius } => {
                 // Sums of two floats far apart in size are rounded in f64 too: one step outwards
                 // makes up for it.
@@ -65,7 +79,7 @@ impl Shape {
     }
 }
 
-/// Counts the scene, and checks that every triangle has its vertices.
+/// Counts the scene.
 pub(crate) fn survey(scene: &Scene) -> Result<Survey, BuildError> {
     let mut prims = 0usize;
     let mut count = |n: usize| -> Result<(), BuildError> {
@@ -74,22 +88,13 @@ pub(crate) fn survey(scene: &Scene) -> Result<Survey, BuildError> {
     };
     let geometries = scene.mesh_count().checked_add(scene.sphere_set_count());
     let geometry_count = geometries.filter(|n| *n < MOST_PRIMS).ok_or(BuildError::TooLarge)?;
-    for m in 0..scene.mesh_count() {
-        let Some(mesh) = scene.mesh(m) else { continue };
+    for mesh in (0..scene.mesh_count()).filter_map(|m| scene.mesh(m)) {
         count(mesh.triangle_count())?;
-        if let Some(triangle) = (0..mesh.triangle_count()).find(|&i| mesh.triangle(i).is_none()) {
-            return Err(if mesh.is_indexed() {
-                BuildError::IndexOutOfRange { mesh: m as u32, triangle: triangle as u32 }
-            } else {
-                BuildError::VerticesMissing { mesh: m as u32 }
-            });
-        }
     }
     let mut spheres = 0;
-    for s in 0..scene.sphere_set_count() {
-        let n = scene.sphere_set(s).map_or(0, |set| set.sphere_count());
-        count(n)?;
-        spheres += n;
+    for set in (0..scene.sphere_set_count()).filter_map(|s| scene.sphere_set(s)) {
+        count(set.sphere_count())?;
+        spheres += set.sphere_count();
     }
     Ok(Survey {
         mesh_count: scene.mesh_count() as u32,
@@ -99,24 +104,75 @@ pub(crate) fn survey(scene: &Scene) -> Result<Survey, BuildError> {
     })
 }
 
-/// Calls `f` with each primitive that can be hit, in the order of flat numbers.
-pub(crate) fn for_each_prim(scene: &Scene, mut f: impl FnMut(Prim)) {
-    let mut id = 0;
-    let mut offer = |shape: Option<Shape>| {
-        if let Some(shape) = shape.and_then(Shape::sound) {
-            f(Prim { id, shape });
-        }
-        id += 1;
+/// Calls `f` with the numbers in `range` and what has them; `None` for a triangle without vertices.
+#[inline]
+fn for_each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut(u32, Option<Shape>)) {
+    let Range { start, end } = range;
+    let mut first = 0;
+    // The part of a geometry with `count` primitives that is in the range.
+    let mut next = |count: usize| {
+        let base = first;
+        first += count as u32;
+        (base, start.max(base) - base..end.min(first).max(base) - base)
     };
     for mesh in (0..scene.mesh_count()).filter_map(|m| scene.mesh(m)) {
-        for i in 0..mesh.triangle_count() {
-            offer(mesh.triangle(i).map(Shape::Triangle));
+        let (base, part) = next(mesh.triangle_count());
+        for i in part {
+            f(base + i, mesh.triangle(i as usize).map(Shape::Triangle));
         }
     }
     for set in (0..scene.sphere_set_count()).filter_map(|s| scene.sphere_set(s)) {
-        for i in 0..set.sphere_count() {
-            offer(set.sphere(i).map(sphere));
+        let (base, part) = next(set.sphere_count());
+        for i in part {
+            f(base + i, set.sphere(i as usize).map(sphere));
         }
+    }
+}
+
+/// Calls `f` with each primitive that can be hit, in the order of flat numbers.
+pub(crate) fn for_each_prim(scene: &Scene, f: impl FnMut(Prim)) {
+    for_each_prim_in(scene, 0..u32::MAX, false, f);
+}
+
+/// Calls `f` with each primitive in `range` that can be hit; with `sound`, all of them can.
+#[inline]
+pub(crate) fn for_each_prim_in(
+    scene: &Scene,
+    range: Range<u32>,
+    sound: bool,
+    mut f: impl FnMut(Prim),
+) {
+    for_each_shape(scene, range, |id, shape| {
+        if let Some(shape) = shape.and_then(|shape| if sound { Some(shape) } else { shape.sound() })
+        {
+            f(Prim { id, shape });
+        }
+    });
+}
+
+/// Finds shapes by their flat numbers, quickly if the next one is of the same mesh.
+pub(crate) struct Shapes<'s, 'a> {
+    scene: &'s Scene<'a>,
+    geometries: &'s [Geometry],
+    mesh: Option<(u32, Mesh<'a>)>,
+}
+
+impl<'s, 'a> Shapes<'s, 'a> {
+    pub fn new(scene: &'s Scene<'a>, geometries: &'s [Geometry]) -> Self {
+        Shapes { scene, geometries, mesh: None }
+    }
+
+    /// The shape with flat number `id`, whether it can be hit or not.
+    #[inline]
+    pub fn get(&mut self, id: u32) -> Option<Shape> {
+        if let Some((first, mesh)) = &self.mesh
+            && let Some(triangle) = id.checked_sub(*first).and_then(|i| mesh.triangle(i as usize))
+        {
+            return Some(Shape::Triangle(triangle));
+        }
+        let (number, geometry) = geometry_of(id, self.geometries)?;
+        self.mesh = self.scene.mesh(number as usize).map(|mesh| (geometry.first, mesh));
+        shape(self.scene, self.geometries, id)
     }
 }
 
@@ -150,8 +206,8 @@ pub(crate) fn geometries(scene: &Scene, out: &mut [Geometry]) {
 }
 
 impl Census {
-    /// Counts what can be hit, and finds its bounds.
-    pub fn take(scene: &Scene, survey: &Survey) -> Census {
+    /// Counts what can be hit, finds its bounds, and checks that every triangle has its vertices.
+    pub fn take(scene: &Scene, survey: &Survey) -> Result<Census, BuildError> {
         let mut census = Census {
             bounds: Aabb::EMPTY,
             mesh_count: survey.mesh_count,
@@ -159,21 +215,41 @@ impl Census {
             prim_limit: survey.prim_limit,
             triangle_count: 0,
             sphere_count: 0,
-            ignored_count: survey.prim_limit,
+            ignored_count: 0,
         };
-        for_each_prim(scene, |prim| {
-            census.bounds.add(&prim.shape.aabb());
-            census.ignored_count -= 1;
-            match prim.shape {
-                Shape::Triangle(_) => census.triangle_count += 1,
-                Shape::Sphere { .. } => census.sphere_count += 1,
+        let mut missing = None;
+        for_each_shape(scene, 0..u32::MAX, |id, shape| match shape.map(Shape::sound) {
+            Some(Some(shape)) => {
+                census.bounds.add(&shape.aabb());
+                match shape {
+                    Shape::Triangle(_) => census.triangle_count += 1,
+                    Shape::Sphere { .. } => census.sphere_count += 1,
+                }
             }
+            Some(None) => census.ignored_count += 1,
+            None => missing = missing.or(Some(id)),
         });
-        census
+        missing.map_or(Ok(census), |id| Err(incomplete(scene, id)))
     }
 
     /// The number of primitives that can be hit.
     pub fn hittable(&self) -> u32 {
         self.triangle_count + self.sphere_count
     }
+}
+
+/// What is wrong with triangle `id`, which has no vertices.
+fn incomplete(scene: &Scene, id: u32) -> BuildError {
+    let mut first = 0;
+    for (m, mesh) in (0..).zip((0..scene.mesh_count()).filter_map(|m| scene.mesh(m))) {
+        let triangle = id - first;
+        if (triangle as usize) < mesh.triangle_count() {
+            return match mesh.is_indexed() {
+                true => BuildError::IndexOutOfRange { mesh: m, triangle },
+                false => BuildError::VerticesMissing { mesh: m },
+            };
+        }
+        first += mesh.triangle_count() as u32;
+    }
+    BuildError::TooLarge
 }

@@ -4,7 +4,9 @@ mod gather;
 mod pack;
 mod validate;
 
-pub(crate) use gather::{Shape, Survey, for_each_prim, geometries, shape, survey};
+pub(crate) use gather::{
+    Shape, Shapes, Survey, for_each_prim, for_each_prim_in, geometries, shape, survey,
+};
 pub(crate) use pack::Packer;
 pub(crate) use validate::leaves_are_sound;
 

@@ -16,6 +16,7 @@ pub(crate) struct Packer<'b> {
     sphere_blocks: &'b mut [SphereBlock],
     triangles: Fill,
     spheres: Fill,
+    numbers: Numbers,
 }
 
 /// How far blocks of one kind are filled.
@@ -40,7 +41,8 @@ impl<'b> Packer<'b> {
         first_sphere: u32,
     ) -> Self {
         let spheres = Fill { next_id: first_sphere, ..Fill::default() };
-        Packer { triangle_blocks, sphere_blocks, triangles: Fill::default(), spheres }
+        let triangles = Fill::default();
+        Packer { triangle_blocks, sphere_blocks, triangles, spheres, numbers: Numbers::NONE }
     }
 
     /// The number of triangle blocks in use.
@@ -79,13 +81,16 @@ impl<'b> Packer<'b> {
         let fill = &mut self.triangles;
         let open = fill.blocks.checked_sub(1).and_then(|b| self.triangle_blocks.get(b));
         let fits = open.is_some_and(|block| {
+            let known = |v: &&[f32; 3]| self.numbers.find(block, v).is_ok();
             !fill.closed
                 && (block.count as usize) < TRIANGLES
-                && fill.vertices + missing(block, fill.vertices, &corners) <= TRIANGLES
+                && (fill.vertices + 3 <= TRIANGLES
+                    || fill.vertices + 3 - corners.iter().filter(known).count() <= TRIANGLES)
         });
         if !fits {
             *self.triangle_blocks.get_mut(fill.blocks)? =
                 TriangleBlock { first: fill.next_id, ..TriangleBlock::EMPTY };
+            self.numbers = Numbers::NONE;
             fill.blocks += 1;
             fill.vertices = 0;
             fill.closed = false;
@@ -94,8 +99,9 @@ impl<'b> Packer<'b> {
         let block = self.triangle_blocks.get_mut(number)?;
         let lane = block.count;
         for (k, corner) in corners.iter().enumerate() {
-            let v = find(block, fill.vertices, corner).unwrap_or_else(|| {
+            let v = self.numbers.find(block, corner).unwrap_or_else(|place| {
                 let v = fill.vertices;
+                self.numbers.0[place] = v as u8;
                 for (axis, x) in block.vertices.iter_mut().zip(corner) {
                     axis[v] = *x;
                 }
@@ -129,15 +135,33 @@ impl<'b> Packer<'b> {
     }
 }
 
-/// The vertex with just these bits among the first `count`.
-fn find(block: &TriangleBlock, count: usize, corner: &[f32; 3]) -> Option<usize> {
-    let has = |v: usize, k: usize| block.vertices[k][v].to_bits() == corner[k].to_bits();
-    (0..count).find(|&v| (0..3).all(|k| has(v, k)))
-}
+/// The numbers of the open block's vertices by their bits: a hash table, since a block that was
+/// written a moment ago is slow to search with vectors.
+#[derive(Clone, Copy)]
+struct Numbers([u8; 64]);
 
-/// How many vertices of the triangle the block does not have yet, at most.
-fn missing(block: &TriangleBlock, count: usize, corners: &[[f32; 3]; 3]) -> usize {
-    corners.iter().filter(|corner| find(block, count, corner).is_none()).count()
+impl Numbers {
+    const NONE: Numbers = Numbers([u8::MAX; 64]);
+
+    /// The number of a vertex among those of `block`, or the free place of the table for it.
+    #[inline]
+    fn find(&self, block: &TriangleBlock, vertex: &[f32; 3]) -> Result<usize, usize> {
+        let [x, y, z] = vertex.map(f32::to_bits);
+        let hash =
+            x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ z.wrapping_mul(0xC2B2_AE3D);
+        let mut place = (hash >> 26) as usize;
+        // At most 16 places are taken.
+        loop {
+            let v = self.0[place % 64] as usize;
+            if v >= TRIANGLES {
+                return Err(place % 64);
+            }
+            if block.vertices.map(|axis| axis[v].to_bits()) == [x, y, z] {
+                return Ok(v);
+            }
+            place += 1;
+        }
+    }
 }
 
 #[cfg(test)]

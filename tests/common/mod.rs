@@ -3,13 +3,14 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 use raykern::{
-    Accel, Backend, BuildOptions, Hit, Layout, OwnedAccel, PlainList, QueryOptions, Ray, Scene,
+    Accel, Backend, BuildOptions, Hit, Layout, OwnedAccel, PlainList, Quality, QueryOptions, Ray,
+    Scene,
 };
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
 
-/// List, grid and BVH in every layout over one scene, each forced.
-pub struct All([(&'static str, OwnedAccel); 6]);
+/// List, grid, and BVH in every layout and quality over one scene, each forced.
+pub struct All([(&'static str, OwnedAccel); 10]);
 
 /// Uses the backend that the environment's `RAYKERN_BACKEND` names, if it names one.
 pub fn choose_backend() {
@@ -23,11 +24,13 @@ impl All {
         choose_backend();
         let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
         let never = with(PlainList::Never);
-        let bvh = |layout| {
-            let built = OwnedAccel::bvh(scene, &BuildOptions { layout, ..never }).expect("a BVH");
+        let of_quality = |layout, quality| {
+            let options = BuildOptions { layout, quality, ..never };
+            let built = OwnedAccel::bvh(scene, &options).expect("a BVH");
             Accel::open(built.accel().block()).expect("a sound block");
             built
         };
+        let bvh = |layout| of_quality(layout, Quality::Balanced);
         All([
             ("list", OwnedAccel::bvh(scene, &with(PlainList::Always)).expect("a list")),
             ("grid", OwnedAccel::grid(scene, &never).expect("a grid")),
@@ -35,6 +38,10 @@ impl All {
             ("wide 4", bvh(Layout::Wide(4))),
             ("wide 8", bvh(Layout::Wide(8))),
             ("wide 16", bvh(Layout::Wide(16))),
+            ("compact fast", of_quality(Layout::Compact, Quality::Fast)),
+            ("compact best", of_quality(Layout::Compact, Quality::Best)),
+            ("wide 16 fast", of_quality(Layout::Wide(16), Quality::Fast)),
+            ("wide 16 best", of_quality(Layout::Wide(16), Quality::Best)),
         ])
     }
 
@@ -42,8 +49,8 @@ impl All {
         model.with_scene(Self::build)
     }
 
-    pub fn accels(&self) -> [(&'static str, Accel<'_>); 6] {
-        [0, 1, 2, 3, 4, 5].map(|i| (self.0[i].0, self.0[i].1.accel()))
+    pub fn accels(&self) -> [(&'static str, Accel<'_>); 10] {
+        self.0.each_ref().map(|(name, built)| (*name, built.accel()))
     }
 }
 

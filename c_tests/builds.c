@@ -1,0 +1,94 @@
+// Builds in every quality, on the caller's threads, watched and cancelled: the same bytes each time.
+
+#include "check.h"
+
+#include <fenv.h>
+#include <pthread.h>
+
+#define WORKERS 3
+
+// A build's tasks, and who takes the next one.
+typedef struct Crew {
+    RtTask task;
+    void *context;
+    uint32_t count, next, ran;
+    pthread_mutex_t lock;
+} Crew;
+
+static void *work(void *user) {
+    Crew *crew = user;
+    // Threads of a renderer have any floating-point state.
+    CHECK(fesetround(FE_UPWARD) == 0);
+    for (;;) {
+        pthread_mutex_lock(&crew->lock);
+        uint32_t i = crew->next++;
+        pthread_mutex_unlock(&crew->lock);
+        if (i >= crew->count) break;
+        crew->task(crew->context, i);
+        CHECK(fegetround() == FE_UPWARD);
+    }
+    return NULL;
+}
+
+static void parallel_for(void *user, uint32_t count, RtTask task, void *context) {
+    Crew *crew = user;
+    crew->task = task;
+    crew->context = context;
+    crew->count = count;
+    crew->next = 0;
+    crew->ran += count;
+    pthread_t threads[WORKERS];
+    for (int i = 0; i < WORKERS; i++) CHECK(pthread_create(&threads[i], NULL, work, crew) == 0);
+    for (int i = 0; i < WORKERS; i++) CHECK(pthread_join(threads[i], NULL) == 0);
+}
+
+static uint32_t calls, allowed;
+static float told;
+
+static bool progress(void *user, float done) {
+    CHECK(user != NULL && done >= told && done <= 1.0f);
+    told = done;
+    return ++calls <= allowed;
+}
+
+int main(void) {
+    RtMesh mesh = sheet(100);
+    RtScene scene = scene_of(&mesh, 1, NULL, 0);
+    const uint32_t qualities[3] = {RT_QUALITY_FAST, RT_QUALITY_BALANCED, RT_QUALITY_BEST};
+    Crew crew = {.lock = PTHREAD_MUTEX_INITIALIZER};
+    for (int i = 0; i < 3; i++) {
+        RtBuildOptions options = {0};
+        options.struct_size = sizeof options;
+        options.quality = qualities[i];
+        const RtAccel *alone = built(&scene, false, &options);
+        options.user = &crew;
+        options.parallel_for = parallel_for;
+        options.worker_count = 1;
+        crew.ran = 0;
+        built(&scene, false, &options);
+        CHECK(crew.ran == 0);
+        options.worker_count = WORKERS;
+        const RtAccel *together = built(&scene, false, &options);
+        CHECK(crew.ran > 4);
+        CHECK(rt_accel_size(alone) == rt_accel_size(together));
+        CHECK(memcmp(alone, together, rt_accel_size(alone)) == 0);
+
+        // Cancelled at each call, in the same memory, which then takes a build.
+        options.progress = progress;
+        RtMemory need;
+        CHECK(rt_bvh_needs(&scene, &options, &need) == RT_OK);
+        unsigned char *memory = aligned(need.size);
+        const RtAccel *out = NULL;
+        for (allowed = 0;; allowed++) {
+            calls = 0;
+            told = 0.0f;
+            RtStatus status = rt_build_bvh(&scene, &options, memory, need.size, &out);
+            CHECK(calls >= 1);
+            if (status == RT_OK) break;
+            CHECK(status == RT_ERROR_CANCELLED && calls == allowed + 1 && out == NULL);
+        }
+        CHECK(told == 1.0f && allowed >= 3);
+        CHECK(memcmp(alone, out, rt_accel_size(alone)) == 0);
+    }
+    return 0;
+}

@@ -1,0 +1,195 @@
+//! Where to part the refs of a large node: SAH over bins.
+
+use super::split::{Areas, Box4, Extent, centre, greater, lesser};
+use super::tree::PrimRef;
+
+/// Bins along each axis at most.
+const BINS: usize = 32;
+
+/// How carefully planes are chosen.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Effort {
+    /// Bins along each axis, at most [`BINS`].
+    bins: usize,
+    /// Of more refs than twice this, some are enough to choose a plane by.
+    samples: usize,
+    /// Whether only the axis is looked at along which the centres are furthest apart.
+    one_axis: bool,
+}
+
+impl Effort {
+    pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true };
+    pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false };
+    pub const BEST: Effort = Effort { bins: BINS, samples: 1 << 29, one_axis: false };
+}
+
+/// How centres fall into bins.
+#[derive(Clone, Copy)]
+struct Binning {
+    lower: [f32; 4],
+    scale: [f32; 4],
+    bins: usize,
+}
+
+impl Binning {
+    fn new(centres: &Box4, count: usize, most: usize) -> Self {
+        // Few refs leave most bins empty.
+        let bins = (4 + count / 8).min(most);
+        let scale = core::array::from_fn(|k| bins as f32 / (centres.upper[k] - centres.lower[k]));
+        Binning { lower: centres.lower, scale, bins }
+    }
+
+    /// The bins on the three axes. NaN, from infinite boxes or an axis without extent, goes to bin 0:
+    /// everything is in some bin.
+    #[inline]
+    fn bins_of(&self, r: &PrimRef) -> [usize; 4] {
+        // Above 2^23 the lowest bits of a float are those of an integer.
+        const INTEGER: f32 = (1 << 23) as f32;
+        let (centre, last) = (centre(r), (self.bins - 1) as f32);
+        let bits: [u32; 4] = core::array::from_fn(|k| {
+            let at = (centre[k] - self.lower[k]) * self.scale[k] - 0.5;
+            (lesser(greater(at, 0.0), last) + INTEGER).to_bits() % BINS as u32
+        });
+        bits.map(|bin| bin as usize)
+    }
+
+    /// The lower wall of a bin, in coordinates of centres.
+    fn wall(&self, bin: usize, axis: usize) -> f32 {
+        self.lower[axis] + bin as f32 / self.scale[axis]
+    }
+}
+
+/// The plane of least cost, between two bins of one axis.
+pub(crate) struct Plane {
+    binning: Binning,
+    axis: usize,
+    /// Bins below this one are left.
+    bin: usize,
+    /// The boxes of the sides, unless only a sample of the refs is in the bins.
+    bounds: Option<[Box4; 2]>,
+}
+
+impl Plane {
+    /// Brings the refs left of the plane to the front; returns their number.
+    ///
+    /// Every ref is moved, left or not: a branch would be guessed wrong half the time.
+    pub fn part(&self, refs: &mut [PrimRef]) -> usize {
+        let mut count = 0;
+        for i in 0..refs.len() {
+            let left = self.binning.bins_of(&refs[i])[self.axis] < self.bin;
+            refs.swap(i, count);
+            count += usize::from(left);
+        }
+        count
+    }
+
+    /// Where the refs of the two sides lie, after [`part`](Self::part) has put `left_count` of them to
+    /// the front.
+    pub fn sides(&self, refs: &[PrimRef], left_count: usize, centres: &Box4) -> [Extent; 2] {
+        let Some(bounds) = self.bounds else {
+            let (left, right) = refs.split_at(left_count);
+            return [Extent::around(left), Extent::around(right)];
+        };
+        // What the centres do not leave: the plane, and half of the bounds.
+        let (axis, wall) = (self.axis, self.binning.wall(self.bin, self.axis));
+        let mut centres = [*centres; 2];
+        centres[0].upper[axis] = lesser(wall, centres[0].upper[axis]);
+        centres[1].lower[axis] = greater(wall, centres[1].lower[axis]);
+        let side = |i: usize| {
+            let (c, b) = (&centres[i], &bounds[i]);
+            let lower = core::array::from_fn(|k| greater(0.5 * b.lower[k], c.lower[k]));
+            let upper = core::array::from_fn(|k| lesser(0.5 * b.upper[k], c.upper[k]));
+            Extent { bounds: bounds[i], centres: Box4 { lower, upper } }
+        };
+        [side(0), side(1)]
+    }
+}
+
+/// The bins of the three axes: scratch for [`best_plane`].
+pub(crate) struct Bins([Axis; 3]);
+
+struct Axis {
+    bounds: [Box4; BINS],
+    counts: [u32; BINS],
+}
+
+impl Bins {
+    pub const EMPTY: Bins =
+        Bins([const { Axis { bounds: [Box4::EMPTY; BINS], counts: [0; BINS] } }; 3]);
+}
+
+/// The best split by bins of the box that the centres do not leave, or `None` when all fall into one.
+///
+/// Source: \[Wald07\].
+pub(crate) fn best_plane(
+    refs: &[PrimRef],
+    centres: &Box4,
+    areas: Areas,
+    effort: Effort,
+    Bins(axes): &mut Bins,
+) -> Option<Plane> {
+    let binning = Binning::new(centres, refs.len(), effort.bins);
+    let first = if effort.one_axis { centres.widest() } else { 0 };
+    let looked_at = if effort.one_axis { first..first + 1 } else { 0..3 };
+    for axis in &mut axes[looked_at.clone()] {
+        axis.bounds[..binning.bins].fill(Box4::EMPTY);
+        axis.counts[..binning.bins].fill(0);
+    }
+    let all = refs.len() < 2 * effort.samples;
+    let step = if all { 1 } else { refs.len() / effort.samples };
+    let sample = refs.iter().step_by(step);
+    match &mut axes[looked_at.clone()] {
+        [axis] => sample.for_each(|r| axis.add(r, binning.bins_of(r)[first])),
+        axes => sample.for_each(|r| {
+            let bins = binning.bins_of(r);
+            axes.iter_mut().zip(bins).for_each(|(axis, bin)| axis.add(r, bin));
+        }),
+    }
+    let mut best = (f32::INFINITY, 0, 0);
+    for k in looked_at {
+        let (work, bin) = axes[k].best(binning.bins, areas);
+        if work < best.0 {
+            best = (work, k, bin);
+        }
+    }
+    let (_, axis, bin) = best;
+    if bin == 0 {
+        return None;
+    }
+    let (left, right) = axes[axis].bounds[..binning.bins].split_at(bin);
+    let bounds = all.then(|| [Box4::around(left), Box4::around(right)]);
+    Some(Plane { binning, axis, bin, bounds })
+}
+
+impl Axis {
+    #[inline]
+    fn add(&mut self, r: &PrimRef, bin: usize) {
+        self.bounds[bin].add(&r.bounds);
+        self.counts[bin] += 1;
+    }
+
+    /// The least work of a split, and the first bin on its right; 0 when there is none.
+    fn best(&self, bins: usize, areas: Areas) -> (f32, usize) {
+        let (bounds, counts) = (&self.bounds[..bins], &self.counts[..bins]);
+        // What lies right of each plane, from the right; then what lies left.
+        let mut right = [(0.0f32, 0u32); BINS];
+        let (mut all, mut count) = (Box4::EMPTY, 0);
+        for ((right, one), n) in right.iter_mut().zip(bounds).zip(counts).skip(1).rev() {
+            all.add(one);
+            count += n;
+            *right = (areas.of_finite(&all) * count as f32, count);
+        }
+        let (mut all, mut count) = (Box4::EMPTY, 0);
+        let mut best = (f32::INFINITY, 0);
+        let planes = right.iter().zip(1..).skip(1).map(|(right, bin)| (right, bin - 1));
+        for ((one, n), ((right_work, right_count), bin)) in bounds.iter().zip(counts).zip(planes) {
+            all.add(one);
+            count += n;
+            let work = areas.of_finite(&all) * count as f32 + right_work;
+            if count > 0 && *right_count > 0 && work < best.0 {
+                best = (work, bin);
+            }
+        }
+        best
+    }
+}

@@ -1,0 +1,137 @@
+//! What a build borrows from its caller: threads, and an ear for how far it is.
+
+#![allow(unsafe_code, reason = "tasks take elements of one slice apart")]
+
+use core::cell::Cell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+/// The caller's threads, lent to a build.
+pub trait Threads: Sync {
+    /// How many tasks may run at once. With one, nothing is lent.
+    fn worker_count(&self) -> usize;
+
+    /// Calls `task(i)` for each `i` below `count`, in any order and on any thread, and returns when
+    /// all are done. Tasks never block and never nest.
+    fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync));
+}
+
+/// The caller, as a build in progress sees it.
+pub(crate) struct Caller<'a> {
+    threads: Option<&'a dyn Threads>,
+    progress: Option<&'a dyn Fn(f32) -> bool>,
+    cancelled: Cell<bool>,
+}
+
+impl<'a> Caller<'a> {
+    pub fn new(
+        threads: Option<&'a dyn Threads>,
+        progress: Option<&'a dyn Fn(f32) -> bool>,
+    ) -> Caller<'a> {
+        let threads = threads.filter(|threads| threads.worker_count() > 1);
+        Caller { threads, progress, cancelled: Cell::new(false) }
+    }
+
+    /// Says how much is done, from 0 to 1; `None` when the caller wants no more.
+    pub fn done(&self, part: f32) -> Option<()> {
+        let goes_on = !self.cancelled() && self.progress.is_none_or(|progress| progress(part));
+        self.cancelled.set(!goes_on);
+        goes_on.then_some(())
+    }
+
+    /// Whether the caller wanted no more.
+    pub fn cancelled(&self) -> bool {
+        self.cancelled.get()
+    }
+
+    /// Calls `work` with each item: on the caller's threads, if there are any.
+    ///
+    /// Neither what is called nor its result depends on how many threads there are.
+    pub fn for_each<T: Send>(&self, items: &mut [T], work: impl Fn(&mut T) + Sync) {
+        let Some(threads) = self.threads.filter(|_| items.len() > 1) else {
+            return items.iter_mut().for_each(work);
+        };
+        for items in items.chunks_mut(Taken::MOST) {
+            let count = items.len();
+            let (taken, items) = (Taken::default(), Items(items.as_mut_ptr()));
+            let task = |i: u32| {
+                if (i as usize) < count && taken.take(i) {
+                    // SAFETY: below `count`, so an element of the slice that `chunks_mut` lent; and
+                    // taken just now, which happens once, so nobody else has it.
+                    work(unsafe { &mut *items.at(i as usize) });
+                }
+            };
+            threads.parallel_for(count as u32, &task);
+            // What was left out, if anything was.
+            (0..count as u32).for_each(task);
+        }
+    }
+}
+
+/// Elements that are handed out one by one.
+struct Items<T>(*mut T);
+
+// SAFETY: an element is handed to one thread at a time, which `T: Send` allows.
+unsafe impl<T: Send> Sync for Items<T> {}
+
+impl<T> Items<T> {
+    fn at(&self, i: usize) -> *mut T {
+        self.0.wrapping_add(i)
+    }
+}
+
+/// Which elements are taken, one bit each.
+#[derive(Default)]
+struct Taken([AtomicU32; 4]);
+
+impl Taken {
+    const MOST: usize = 128;
+
+    /// True for the first who asks for `i`, below [`MOST`](Self::MOST).
+    fn take(&self, i: u32) -> bool {
+        let bit = 1 << (i % 32);
+        let word = self.0.get(i as usize / 32);
+        word.is_some_and(|word| word.fetch_or(bit, Ordering::Relaxed) & bit == 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs tasks in an order of its own: backwards, some twice, some not at all.
+    struct Odd;
+
+    impl Threads for Odd {
+        fn worker_count(&self) -> usize {
+            3
+        }
+
+        fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+            for i in (0..count + 5).rev().filter(|i| i % 7 != 3) {
+                task(i);
+                task(i);
+            }
+        }
+    }
+
+    #[test]
+    fn each_item_is_worked_on_once_whatever_the_caller_does() {
+        for count in [0, 1, 2, 127, 128, 129, 1000] {
+            let mut items = std::vec![0; count];
+            Caller::new(Some(&Odd), None).for_each(&mut items, |item| *item += 1);
+            assert!(items.iter().all(|n| *n == 1), "{count}");
+        }
+    }
+
+    #[test]
+    fn who_cancels_is_asked_no_more() {
+        let asked = Cell::new(0);
+        let progress = |_: f32| {
+            asked.set(asked.get() + 1);
+            asked.get() < 2
+        };
+        let caller = Caller::new(None, Some(&progress));
+        assert_eq!([0.1, 0.2, 0.3].map(|part| caller.done(part).is_some()), [true, false, false]);
+        assert!(caller.cancelled() && asked.get() == 2);
+    }
+}

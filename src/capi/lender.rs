@@ -1,0 +1,112 @@
+//! Build options from C: choices, and what the caller lends to a build.
+
+use core::ffi::c_void;
+
+use super::control;
+use super::status::Error;
+use super::types::{
+    RT_LAYOUT_AUTOMATIC, RT_LAYOUT_COMPACT, RT_LAYOUT_WIDE_4, RT_LAYOUT_WIDE_8, RT_LAYOUT_WIDE_16,
+    RT_PLAIN_LIST_ALWAYS, RT_PLAIN_LIST_AUTOMATIC, RT_PLAIN_LIST_NEVER, RT_QUALITY_BALANCED,
+    RT_QUALITY_BEST, RT_QUALITY_FAST, RtBuildOptions,
+};
+use super::versioned;
+use crate::accel::Layout;
+use crate::build::{BuildOptions, PlainList, Quality};
+use crate::caller::Threads;
+
+/// A C caller during a build.
+pub(super) struct Lender(Option<RtBuildOptions>);
+
+// SAFETY: tasks that run on other threads do not reach it: the only thread that calls the caller's
+// functions, and hands `user` to them, is the one that builds.
+unsafe impl Sync for Lender {}
+
+impl Lender {
+    /// The options at `options`; null means the default ones.
+    ///
+    /// # Safety
+    ///
+    /// `options` is null or valid; its functions may be called with its `user` while it lives, and
+    /// `parallel_for` calls its task as `RtParallelFor` says.
+    pub unsafe fn read(options: *const RtBuildOptions) -> Result<Lender, Error> {
+        if options.is_null() {
+            return Ok(Lender(None));
+        }
+        // SAFETY: the caller's promise.
+        Ok(Lender(Some(unsafe { versioned::read(options) }?)))
+    }
+
+    /// What says how far a build is.
+    pub fn progress(&self) -> impl Fn(f32) -> bool + '_ {
+        |done| {
+            let call = self.0.as_ref().and_then(|raw| Some((raw.progress?, raw.user)));
+            // SAFETY: the caller's function with what belongs to it, as promised to `read`.
+            call.is_none_or(|(progress, user)| unsafe { progress(user, done) })
+        }
+    }
+
+    /// The options as a build takes them.
+    pub fn options<'l>(
+        &'l self,
+        progress: &'l dyn Fn(f32) -> bool,
+    ) -> Result<BuildOptions<'l>, Error> {
+        let Some(raw) = &self.0 else { return Ok(BuildOptions::default()) };
+        let quality = match raw.quality {
+            RT_QUALITY_BALANCED => Quality::Balanced,
+            RT_QUALITY_FAST => Quality::Fast,
+            RT_QUALITY_BEST => Quality::Best,
+            _ => return Err(Error::InvalidArgument),
+        };
+        let layout = match raw.layout {
+            RT_LAYOUT_AUTOMATIC => Layout::Automatic,
+            RT_LAYOUT_COMPACT => Layout::Compact,
+            RT_LAYOUT_WIDE_4 | RT_LAYOUT_WIDE_8 | RT_LAYOUT_WIDE_16 => Layout::Wide(raw.layout),
+            _ => return Err(Error::InvalidArgument),
+        };
+        let refit = match raw.refit {
+            0 => false,
+            1 => true,
+            _ => return Err(Error::InvalidArgument),
+        };
+        let plain_list = match raw.plain_list {
+            RT_PLAIN_LIST_AUTOMATIC => PlainList::Automatic,
+            RT_PLAIN_LIST_NEVER => PlainList::Never,
+            RT_PLAIN_LIST_ALWAYS => PlainList::Always,
+            _ => return Err(Error::InvalidArgument),
+        };
+        let threads: Option<&dyn Threads> =
+            if raw.parallel_for.is_some() { Some(self) } else { None };
+        Ok(BuildOptions { quality, layout, refit, plain_list, threads, progress: Some(progress) })
+    }
+}
+
+/// What a task is, as `context` points to it.
+type Task<'t> = &'t (dyn Fn(u32) + Sync);
+
+/// Runs a task on a thread of the caller's, whose floating-point state may be any.
+///
+/// # Safety
+///
+/// `context` is what `parallel_for` was given, and that call has not returned.
+unsafe extern "C" fn run(context: *mut c_void, index: u32) {
+    // SAFETY: it points to the task of a call that waits.
+    let task = unsafe { *context.cast_const().cast::<Task>() };
+    control::with_default(|| task(index));
+}
+
+impl Threads for Lender {
+    fn worker_count(&self) -> usize {
+        self.0.as_ref().map_or(1, |raw| raw.worker_count as usize)
+    }
+
+    fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+        if let Some(raw) = &self.0
+            && let Some(parallel_for) = raw.parallel_for
+        {
+            let context: Task = task;
+            let context = core::ptr::from_ref(&context).cast_mut().cast();
+            // SAFETY: the caller's function with what belongs to it, as promised to `read`.
+            unsafe { parallel_for(raw.user, count, Some(run), context) };
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! Builds with every quality, on any number of threads, watched and cancelled.
+
+#![allow(missing_docs)]
+
+mod common;
+
+use std::cell::RefCell;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use common::{bits, odd_models};
+use raykern::{
+    Accel, BuildError, BuildOptions, Layout, OwnedAccel, PlainList, Quality, Scene, Threads,
+};
+use raykern_harness::make;
+use raykern_harness::model::Model;
+use raykern_harness::rays::{Family, RayMaker};
+
+const QUALITIES: [Quality; 3] = [Quality::Fast, Quality::Balanced, Quality::Best];
+const LAYOUTS: [Layout; 2] = [Layout::Compact, Layout::Wide(16)];
+
+/// This many threads, each taking the next task, the last one first.
+struct Crew {
+    workers: usize,
+    tasks: AtomicU32,
+}
+
+impl Crew {
+    fn of(workers: usize) -> Crew {
+        Crew { workers, tasks: AtomicU32::new(0) }
+    }
+}
+
+impl Threads for Crew {
+    fn worker_count(&self) -> usize {
+        self.workers
+    }
+
+    fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+        self.tasks.fetch_add(count, Ordering::Relaxed);
+        let next = AtomicU32::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..self.workers {
+                scope.spawn(|| {
+                    while let Some(i) = count.checked_sub(next.fetch_add(1, Ordering::Relaxed) + 1)
+                    {
+                        task(i);
+                    }
+                });
+            }
+        });
+    }
+}
+
+fn block(model: &Model, options: &BuildOptions) -> Vec<u8> {
+    let built = model.with_scene(|scene| OwnedAccel::bvh(scene, options)).expect("a BVH");
+    built.accel().block().to_vec()
+}
+
+/// Large enough to have branches, and some that are odd.
+fn models() -> Vec<(&'static str, Model)> {
+    let made = make::ALL.map(|(name, make)| (name, make(20_000)));
+    odd_models().into_iter().chain(made).collect()
+}
+
+fn options(quality: Quality, layout: Layout) -> BuildOptions<'static> {
+    BuildOptions { quality, layout, plain_list: PlainList::Never, ..BuildOptions::default() }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_byte() {
+    let mut most_tasks = 0;
+    for (name, model) in models() {
+        for (quality, layout) in QUALITIES.iter().flat_map(|q| LAYOUTS.map(|l| (*q, l))) {
+            let alone = block(&model, &options(quality, layout));
+            for workers in [1, 2, 3, 16] {
+                let crew = Crew::of(workers);
+                let options = BuildOptions { threads: Some(&crew), ..options(quality, layout) };
+                assert!(
+                    alone == block(&model, &options),
+                    "{name} {quality:?} {layout:?} {workers}"
+                );
+                let tasks = crew.tasks.into_inner();
+                assert!(workers > 1 || tasks == 0, "one thread lends nothing");
+                most_tasks = most_tasks.max(tasks);
+            }
+        }
+    }
+    assert!(most_tasks > 8, "{most_tasks} tasks: nothing ran at the same time");
+}
+
+#[test]
+#[cfg(feature = "parallel")]
+fn rayon_lends_its_threads() {
+    let model: Model = make::blob(50_000, 1).into();
+    let alone = options(Quality::Balanced, Layout::Automatic);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("threads");
+    let many = BuildOptions { threads: Some(&raykern::Rayon), ..alone };
+    assert!(block(&model, &alone) == block(&model, &many));
+    assert!(
+        pool.install(|| block(&model, &options(Quality::Balanced, Layout::Automatic)))
+            == block(&model, &alone)
+    );
+}
+
+#[test]
+fn qualities_differ_in_bytes_and_not_in_answers() {
+    let mut different = 0;
+    for (name, model) in models() {
+        let rays = RayMaker::new(&model, 3).many(Family::Random, 300);
+        for layout in LAYOUTS {
+            let built = QUALITIES.map(|quality| {
+                let options = options(quality, layout);
+                model.with_scene(|scene| OwnedAccel::bvh(scene, &options)).expect("a BVH")
+            });
+            let [fast, balanced, best] = built
+                .each_ref()
+                .map(|built| Accel::open(built.accel().block()).expect("a sound block"));
+            different += usize::from(fast.block() != balanced.block());
+            different += usize::from(best.block() != balanced.block());
+            for ray in &rays {
+                let expected = bits(balanced.intersect(ray));
+                assert_eq!(bits(fast.intersect(ray)), expected, "{name} {layout:?} {ray:?}");
+                assert_eq!(bits(best.intersect(ray)), expected, "{name} {layout:?} {ray:?}");
+            }
+        }
+    }
+    assert!(different > 20, "only {different} blocks differ");
+}
+
+#[test]
+fn every_quality_takes_what_is_promised() {
+    for (name, make) in make::ALL {
+        let model = make(20_000);
+        let prims = model.triangle_count() + model.sphere_count();
+        for quality in QUALITIES {
+            let options = options(quality, Layout::Wide(16));
+            let size =
+                model.with_scene(|scene| raykern::bvh_needs(scene, &options)).expect("a size").size;
+            assert!(size <= 100 * prims, "{name} {quality:?}: {}", size / prims);
+            let built = model.with_scene(|scene| OwnedAccel::bvh(scene, &options)).expect("a BVH");
+            let info = built.accel().info();
+            assert_eq!(info.layout, Layout::Wide(16), "{name} {quality:?}");
+            assert!(size <= 3 * info.size, "{name} {quality:?}: {size} for {}", info.size);
+        }
+    }
+}
+
+type Build = fn(&Scene, &BuildOptions) -> Result<OwnedAccel, BuildError>;
+
+#[test]
+fn progress_is_told_and_may_cancel() {
+    let model: Model = make::blob(5_000, 1).into();
+    let builds: [(Build, Layout); 3] = [
+        (OwnedAccel::bvh, Layout::Wide(16)),
+        (OwnedAccel::bvh, Layout::Compact),
+        (OwnedAccel::grid, Layout::Automatic),
+    ];
+    for (build, layout) in builds {
+        let told = RefCell::new(Vec::new());
+        let watched = |most: usize| {
+            told.borrow_mut().clear();
+            let progress = |done| {
+                told.borrow_mut().push(done);
+                told.borrow().len() < most
+            };
+            let options =
+                BuildOptions { progress: Some(&progress), ..options(Quality::Balanced, layout) };
+            model
+                .with_scene(|scene| build(scene, &options))
+                .map(|built| built.accel().block().len())
+        };
+        assert!(watched(usize::MAX).is_ok());
+        let all = told.borrow().clone();
+        assert_eq!((all.first(), all.last()), (Some(&0.0), Some(&1.0)));
+        assert!(all.is_sorted(), "{all:?}");
+        for most in 1..=all.len() {
+            assert_eq!(watched(most), Err(BuildError::Cancelled), "{layout:?} {most}");
+            assert_eq!(told.borrow()[..], all[..most], "{layout:?}: asked after it said no");
+        }
+    }
+}
+
+#[test]
+fn memory_of_a_cancelled_build_may_be_used_again() {
+    let model: Model = make::blob(5_000, 1).into();
+    let plain = options(Quality::Balanced, Layout::Automatic);
+    let expected = block(&model, &plain);
+    let told = AtomicU32::new(0);
+    let progress = |_| told.fetch_add(1, Ordering::Relaxed) < 3;
+    let cancelled = BuildOptions { progress: Some(&progress), ..plain };
+    model.with_scene(|scene| {
+        let size = raykern::bvh_needs(scene, &plain).expect("a size").size;
+        let mut memory = vec![std::mem::MaybeUninit::uninit(); size + 64];
+        let start = memory.as_ptr().align_offset(64);
+        let memory = &mut memory[start..start + size];
+        let stopped = raykern::build_bvh(scene, &cancelled, memory).map(|_| ());
+        assert_eq!(stopped, Err(BuildError::Cancelled));
+        assert!(raykern::build_bvh(scene, &plain, memory).expect("enough").block() == expected);
+    });
+}
