@@ -72,17 +72,6 @@ pub(crate) fn bytes_of<T: Plain>(value: &T) -> &[u8] {
     unsafe { core::slice::from_raw_parts(core::ptr::from_ref(value).cast(), size_of::<T>()) }
 }
 
-/// The block of `size` bytes that starts at `block`.
-///
-/// # Safety
-///
-/// `block` points to `size` readable bytes that nobody writes to during `'m`.
-#[cfg(feature = "capi")]
-pub(crate) unsafe fn from_raw<'m>(block: *const u8, size: usize) -> &'m [u8] {
-    // SAFETY: the caller's promise, word for word.
-    unsafe { core::slice::from_raw_parts(block, size) }
-}
-
 /// Zero bytes from the global allocator, aligned as blocks are.
 ///
 /// The allocator is asked for no alignment, so that it can give back the end of a large piece without
