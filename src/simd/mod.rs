@@ -20,6 +20,9 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
+    /// Correctly rounded.
+    #[allow(dead_code, reason = "for the query path, which does not use it yet")]
+    fn div(self, other: Self) -> Self;
     /// `if self < other { self } else { other }`: a NaN in `self` gives `other`.
     fn min(self, other: Self) -> Self;
     /// `if self > other { self } else { other }`: a NaN in `self` gives `other`.
@@ -27,6 +30,9 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn abs(self) -> Self;
     /// `self`, with the other sign where `sign` is negative.
     fn flipped_by(self, sign: Self) -> Self;
+    /// `self`, whose sign bit is clear, with that of `sign`.
+    #[allow(dead_code, reason = "as above")]
+    fn with_sign_of(self, sign: Self) -> Self;
     /// `self * factor - other`, with one rounding or two: not the same bits from every backend, so
     /// only where the bound allows for both and nothing of it is answered.
     fn fast_mul_sub(self, factor: Self, other: Self) -> Self;

@@ -47,6 +47,11 @@ impl<const N: usize> Lanes<N> for [f32; N] {
     }
 
     #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        zip(self, other, |a, b| a / b)
+    }
+
+    #[inline(always)]
     fn min(self, other: Self) -> Self {
         zip(self, other, |a, b| if a < b { a } else { b })
     }
@@ -64,6 +69,11 @@ impl<const N: usize> Lanes<N> for [f32; N] {
     #[inline(always)]
     fn flipped_by(self, sign: Self) -> Self {
         zip(self, sign, |a, b| f32::from_bits(a.to_bits() ^ (b.to_bits() & 1 << 31)))
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        zip(self, sign, |a, b| f32::from_bits(a.to_bits() | (b.to_bits() & 1 << 31)))
     }
 
     #[inline(always)]

@@ -107,7 +107,7 @@ macro_rules! one {
 }
 
 macro_rules! arithmetic {
-    ($add:ident $sub:ident $mul:ident $min:ident $max:ident) => {
+    ($add:ident $sub:ident $mul:ident $div:ident $min:ident $max:ident) => {
         #[inline(always)]
         fn add(self, other: Self) -> Self {
             one!(self, other => $add)
@@ -121,6 +121,11 @@ macro_rules! arithmetic {
         #[inline(always)]
         fn mul(self, other: Self) -> Self {
             one!(self, other => $mul)
+        }
+
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            one!(self, other => $div)
         }
 
         // These two return their second operand when either is a NaN, and for zeros of two signs.
@@ -149,7 +154,7 @@ macro_rules! compress_by_hand {
 }
 
 impl Lanes<4> for F4 {
-    arithmetic!(_mm_add_ps _mm_sub_ps _mm_mul_ps _mm_min_ps _mm_max_ps);
+    arithmetic!(_mm_add_ps _mm_sub_ps _mm_mul_ps _mm_div_ps _mm_min_ps _mm_max_ps);
     compress_by_hand!(4);
 
     #[inline(always)]
@@ -162,6 +167,12 @@ impl Lanes<4> for F4 {
     fn flipped_by(self, sign: Self) -> Self {
         // SAFETY: SSE2 is there.
         F4(unsafe { _mm_xor_ps(self.0, _mm_and_ps(_mm_set1_ps(-0.0), sign.0)) })
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        // SAFETY: SSE2 is there.
+        F4(unsafe { _mm_or_ps(self.0, _mm_and_ps(_mm_set1_ps(-0.0), sign.0)) })
     }
 
     #[inline(always)]
@@ -189,7 +200,7 @@ impl Lanes<4> for F4 {
 }
 
 impl Lanes<8> for F8 {
-    arithmetic!(_mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_min_ps _mm256_max_ps);
+    arithmetic!(_mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_min_ps _mm256_max_ps);
     compress_by_hand!(8);
 
     #[inline(always)]
@@ -202,6 +213,12 @@ impl Lanes<8> for F8 {
     fn flipped_by(self, sign: Self) -> Self {
         // SAFETY: a value of this type proves AVX2.
         F8(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), sign.0)) })
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        // SAFETY: a value of this type proves AVX2.
+        F8(unsafe { _mm256_or_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), sign.0)) })
     }
 
     #[inline(always)]
@@ -230,7 +247,7 @@ impl Lanes<8> for F8 {
 }
 
 impl Lanes<16> for F16 {
-    arithmetic!(_mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_min_ps _mm512_max_ps);
+    arithmetic!(_mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_min_ps _mm512_max_ps);
 
     #[inline(always)]
     fn abs(self) -> Self {
@@ -241,6 +258,12 @@ impl Lanes<16> for F16 {
     fn flipped_by(self, sign: Self) -> Self {
         // SAFETY: a value of this type proves AVX-512 F and DQ.
         F16(unsafe { _mm512_xor_ps(self.0, _mm512_and_ps(_mm512_set1_ps(-0.0), sign.0)) })
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        // SAFETY: a value of this type proves AVX-512 F and DQ.
+        F16(unsafe { _mm512_or_ps(self.0, _mm512_and_ps(_mm512_set1_ps(-0.0), sign.0)) })
     }
 
     #[inline(always)]
@@ -292,7 +315,7 @@ macro_rules! both {
 macro_rules! two {
     ($n:literal of $half:literal) => {
         impl<V: Lanes<$half>> Lanes<$n> for Two<V> {
-            both!(add sub mul min max flipped_by);
+            both!(add sub mul div min max flipped_by with_sign_of);
             compress_by_hand!($n);
 
             #[inline(always)]
