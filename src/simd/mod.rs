@@ -7,6 +7,8 @@
 #![allow(unsafe_code, reason = "vector instructions are functions that need them")]
 
 mod scalar;
+#[cfg(test)]
+mod tests;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -131,9 +133,20 @@ pub(crate) trait Kernel {
 /// Runs `kernel` with the best instructions there are.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    match Backend::current() {
+    // SAFETY: `current` is never above what `detected` found on this processor.
+    unsafe { run_with(Backend::current(), kernel) }
+}
+
+/// Runs `kernel` with the instructions of `backend`.
+///
+/// # Safety
+///
+/// `backend` is not above what `detected` finds.
+#[inline(always)]
+unsafe fn run_with<K: Kernel>(backend: Backend, kernel: K) -> K::Output {
+    match backend {
         #[cfg(target_arch = "x86_64")]
-        // SAFETY: `current` is never above what `detected` found on this processor.
+        // SAFETY: as the caller promises.
         Backend::Avx512 => unsafe { x86::Avx512::assume() }.run(kernel),
         #[cfg(target_arch = "x86_64")]
         // SAFETY: as above.
