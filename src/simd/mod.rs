@@ -6,11 +6,23 @@
 
 #![allow(unsafe_code, reason = "vector instructions are functions that need them")]
 
+#[macro_use]
+#[allow(unused_macros, reason = "not every processor has vectors")]
+mod macros;
+#[macro_use]
+#[allow(unused_macros, dead_code, reason = "as above")]
+mod doubled;
+/// What this processor has: `detect` and `run_with`.
+#[cfg_attr(target_arch = "x86_64", path = "x86/mod.rs")]
+#[cfg_attr(
+    all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"),
+    path = "neon.rs"
+)]
+#[cfg_attr(all(target_arch = "wasm32", target_feature = "simd128"), path = "wasm.rs")]
+mod native;
 mod scalar;
 #[cfg(test)]
 mod tests;
-#[cfg(target_arch = "x86_64")]
-mod x86;
 
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, Ordering};
@@ -44,7 +56,12 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn less_or_equal(self, other: Self) -> u32;
     fn store(self, out: &mut [f32; N]);
     /// Writes the lanes of `mask` in order to the front of `out`, and anything behind them.
-    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]);
+    #[inline(always)]
+    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]) {
+        let mut lanes = [0.0; N];
+        self.store(&mut lanes);
+        scalar::compress(&lanes, mask, out);
+    }
 }
 
 /// A backend's vectors of `N` lanes.
@@ -53,7 +70,10 @@ pub(crate) trait Width<const N: usize>: Copy {
     fn splat(self, x: f32) -> Self::V;
     fn load(self, lanes: &[f32; N]) -> Self::V;
     /// Writes the words of `mask` in order to the front of `out`, and anything behind them.
-    fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]);
+    #[inline(always)]
+    fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]) {
+        scalar::compress(words, mask, out);
+    }
 }
 
 /// A backend: a proof that its instructions exist.
@@ -63,7 +83,12 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
 
     /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
     /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
-    fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V;
+    #[inline(always)]
+    fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V {
+        let mut lanes = [0.0; 16];
+        table.store(&mut lanes);
+        self.load(&core::array::from_fn::<f32, 16, _>(|i| lanes[corner(list, i)]))
+    }
 
     /// Runs `kernel` with the backend's instructions; all that it inlines may use them.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
@@ -75,7 +100,7 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
 pub enum Backend {
     /// Portable code.
     Scalar = 1,
-    /// 128 bits: SSE2.
+    /// 128 bits: SSE2, NEON on AArch64, or `simd128` in WebAssembly that is compiled for it.
     Bits128 = 2,
     /// 256 bits: AVX2 and FMA.
     Avx2 = 3,
@@ -90,10 +115,7 @@ impl Backend {
 
     /// The best that this processor has.
     pub fn detected() -> Backend {
-        #[cfg(target_arch = "x86_64")]
-        return x86::detect();
-        #[cfg(not(target_arch = "x86_64"))]
-        return Backend::Scalar;
+        native::detect()
     }
 
     /// What queries use now.
@@ -134,27 +156,7 @@ pub(crate) trait Kernel {
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     // SAFETY: `current` is never above what `detected` found on this processor.
-    unsafe { run_with(Backend::current(), kernel) }
-}
-
-/// Runs `kernel` with the instructions of `backend`.
-///
-/// # Safety
-///
-/// `backend` is not above what `detected` finds.
-#[inline(always)]
-unsafe fn run_with<K: Kernel>(backend: Backend, kernel: K) -> K::Output {
-    match backend {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as the caller promises.
-        Backend::Avx512 => unsafe { x86::Avx512::assume() }.run(kernel),
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Backend::Avx2 => unsafe { x86::Avx2::assume() }.run(kernel),
-        #[cfg(target_arch = "x86_64")]
-        Backend::Bits128 => x86::Sse2.run(kernel),
-        _ => Scalar.run(kernel),
-    }
+    unsafe { native::run_with(Backend::current(), kernel) }
 }
 
 /// The lane that `list` names for lane `i`: see [`Simd::corners`].

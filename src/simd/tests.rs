@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 use std::prelude::v1::*;
 
-use super::{Backend, Kernel, Lanes, Scalar, Simd, Width, run_with};
+use super::{Backend, Kernel, Lanes, Scalar, Simd, Width, native};
 
 /// Both zeros, infinities, ones, least and greatest, subnormals, and NaN of both signs, one with a payload.
 const SPECIAL: [u32; 20] = [
@@ -173,7 +173,7 @@ fn every_operation_means_what_the_portable_one_does() {
         let compare = |lanes, bits| {
             let kernel = Compare(Input { lanes, bits });
             // SAFETY: `detected` says that there is this one.
-            unsafe { run_with(backend, kernel) }
+            unsafe { native::run_with(backend, kernel) }
         };
         let mut state = 1;
         // All pairs of special values.
