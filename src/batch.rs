@@ -7,7 +7,7 @@ use crate::bvh::Walk;
 use crate::prim::Leaves;
 use crate::query::Query;
 use crate::ray::{NarrowSlab, PreparedRay, Ray, Slab};
-use crate::simd::{self, Kernel, Simd, Width};
+use crate::simd::{self, Backend, Kernel, Simd, Width};
 use crate::trace::{Question, ask};
 
 /// So many rays are in flight: enough to hide the way to memory, few enough to stay in the first cache.
@@ -25,10 +25,13 @@ pub(crate) fn ask_all<Q: Question + Copy, A>(
     question: Q,
     keep: fn(Q::Answer) -> A,
 ) {
-    if rays.len() > 1 && !matches!(block.bundles, Bundles::None) {
-        simd::dispatch(AskAll { block, rays, answers, question, keep });
-    } else {
-        ask_each(block, rays, answers, question, keep);
+    // Only for the layout that is chosen automatically, and for processors fast enough to wait for memory: every
+    // other pair of a layout and a backend would be one more copy of the code.
+    match block.bundles {
+        Bundles::Sixteen(bundles) if rays.len() > 1 && Backend::current() >= Backend::Avx2 => {
+            simd::dispatch(AskAll { block, bundles, rays, answers, question, keep });
+        }
+        _ => ask_each(block, rays, answers, question, keep),
     }
 }
 
@@ -47,6 +50,7 @@ pub(crate) fn ask_each<Q: Question + Copy, A>(
 
 struct AskAll<'a, 'm, Q: Question, A> {
     block: &'a Block<'m>,
+    bundles: &'m [Bundle<16>],
     rays: &'a [Ray],
     answers: &'a mut [A],
     question: Q,
@@ -58,11 +62,12 @@ impl<Q: Question + Copy, A> Kernel for AskAll<'_, '_, Q, A> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        match self.block.bundles {
-            Bundles::Four(bundles) => self.fly(s, bundles),
-            Bundles::Eight(bundles) => self.fly(s, bundles),
-            Bundles::Sixteen(bundles) => self.fly(s, bundles),
-            Bundles::None => (),
+        // A constant of the backend: nothing of this is compiled for the others.
+        if S::FEW == 0 {
+            self.fly(s);
+        } else {
+            let AskAll { block, rays, answers, question, keep, .. } = self;
+            ask_each(block, rays, answers, question, keep);
         }
     }
 }
@@ -92,7 +97,7 @@ enum Turn {
 
 impl<Q: Question + Copy, A> AskAll<'_, '_, Q, A> {
     #[inline(always)]
-    fn fly<S: Simd + Width<W>, const W: usize>(mut self, s: S, bundles: &[Bundle<W>]) {
+    fn fly<S: Simd>(mut self, s: S) {
         let leaves = Leaves::of(self.block);
         let mut walks = [const { Walk::<ROOM>::new(0.0) }; FLIGHTS];
         let mut flights = [const { Flight::<Q::Query>::NONE }; FLIGHTS];
@@ -104,7 +109,7 @@ impl<Q: Question + Copy, A> AskAll<'_, '_, Q, A> {
         while aloft > 0 {
             for (flight, walk) in flights.iter_mut().zip(&mut walks) {
                 let Flight { number, ray, slab, query: Some(query) } = flight else { continue };
-                let turn = turn(s, walk, bundles, &leaves, ray, slab, query);
+                let turn = turn(s, walk, self.bundles, &leaves, ray, slab, query);
                 if matches!(turn, Turn::GoesOn) {
                     continue;
                 }
@@ -168,10 +173,10 @@ fn alone<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
 
 /// Visits one bundle or one leaf, and has the next fetched.
 #[inline(always)]
-fn turn<S: Simd + Width<W>, Q: Query, const W: usize>(
+fn turn<S: Simd, Q: Query>(
     s: S,
     walk: &mut Walk<ROOM>,
-    bundles: &[Bundle<W>],
+    bundles: &[Bundle<16>],
     leaves: &Leaves,
     ray: &PreparedRay,
     slab: &NarrowSlab,
@@ -181,8 +186,8 @@ fn turn<S: Simd + Width<W>, Q: Query, const W: usize>(
         let Some(bundle) = bundles.get(walk.at().bundle_number()) else {
             return Turn::Ended(false);
         };
-        let t_bounds = Width::<W>::splat(s, walk.t_bound());
-        if !walk.enter(s, bundle, &slab.wide::<S, W>(s), t_bounds, query) {
+        let t_bounds = Width::<16>::splat(s, walk.t_bound());
+        if !walk.enter(s, bundle, &slab.wide::<S, 16>(s), t_bounds, query) {
             return Turn::Crowded;
         }
     } else if walk.open(s, leaves, ray, query) {

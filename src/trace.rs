@@ -163,7 +163,7 @@ impl<D: Decide> Kernel for Find<'_, '_, D> {
 }
 
 /// The record of the meeting that won.
-#[inline(always)]
+#[inline(never)]
 fn hit<D: Decide>(block: &Block, ray: &PreparedRay, best: &D::Met, watch: &mut impl Watch) -> Hit {
     let number = best.place().prim(block.prim_ids);
     let (geometry, first) =

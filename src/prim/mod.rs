@@ -16,7 +16,7 @@ use crate::block::leaf::{
 };
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
-use crate::sieve;
+use crate::sieve::{self, Triangles};
 use crate::simd::Simd;
 
 /// The leaf blocks of one accel.
@@ -149,27 +149,7 @@ impl Leaves<'_> {
         if Q::ANY_BOXES && in_doubt > 2 && !is_near(ray, block, t_bound) {
             return false;
         }
-        let lane = |lane: u32| TriangleLane {
-            block,
-            place: place(number, block.first, lane as usize),
-            sure: found.sure >> lane & 1 == 1,
-            inside: found.inside >> lane & 1 == 1,
-        };
-        if found.candidates.is_power_of_two() {
-            return query.triangle(ray, &lane(found.candidates.trailing_zeros()));
-        }
-        let mut rest = found.candidates;
-        while let Some(next) = found.nearest(rest) {
-            rest &= !(1 << next);
-            if query.triangle(ray, &lane(next)) {
-                return true;
-            }
-            // What was found in a lane may be nearer than others.
-            if query.t_bound() < t_bound {
-                rest &= found.up_to(ray, query.t_bound());
-            }
-        }
-        false
+        consider(block, number, &found, ray, query)
     }
 
     #[inline(never)]
@@ -190,6 +170,42 @@ impl Leaves<'_> {
             })
         })
     }
+}
+
+/// Offers `query` the candidates of a block, near ones first; true when it wants no more.
+///
+/// Out of line, and so the same code for every backend, layout and structure: what is left here is for
+/// scalar numbers.
+#[inline(never)]
+fn consider<Q: Query>(
+    block: &TriangleBlock,
+    number: usize,
+    found: &Triangles,
+    ray: &PreparedRay,
+    query: &mut Q,
+) -> bool {
+    let lane = |lane: u32| TriangleLane {
+        block,
+        place: place(number, block.first, lane as usize),
+        sure: found.sure >> lane & 1 == 1,
+        inside: found.inside >> lane & 1 == 1,
+    };
+    if found.candidates.is_power_of_two() {
+        return query.triangle(ray, &lane(found.candidates.trailing_zeros()));
+    }
+    let t_bound = query.t_bound();
+    let mut rest = found.candidates;
+    while let Some(next) = found.nearest(rest) {
+        rest &= !(1 << next);
+        if query.triangle(ray, &lane(next)) {
+            return true;
+        }
+        // What was found in a lane may be nearer than others.
+        if query.t_bound() < t_bound {
+            rest &= found.up_to(ray, query.t_bound());
+        }
+    }
+    false
 }
 
 /// The place of a lane of the block with this number and first entry.

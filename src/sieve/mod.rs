@@ -7,7 +7,7 @@ mod triangle;
 mod vector;
 
 pub(crate) use sphere::{SphereDetail, sphere};
-pub(crate) use triangle::{detail, triangles};
+pub(crate) use triangle::{Triangles, detail, triangles};
 
 /// Far below every bound on coordinates and squares in the frame, and far above what underflow can take
 /// away.

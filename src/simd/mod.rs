@@ -6,9 +6,23 @@
 
 #![allow(unsafe_code, reason = "vector instructions are functions that need them")]
 
+#[macro_use]
+#[allow(unused_macros, reason = "not every processor has vectors")]
+mod macros;
+#[macro_use]
+#[allow(unused_macros, dead_code, reason = "as above")]
+mod doubled;
+/// What this processor has: `detect` and `run_with`.
+#[cfg_attr(target_arch = "x86_64", path = "x86/mod.rs")]
+#[cfg_attr(
+    all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"),
+    path = "neon.rs"
+)]
+#[cfg_attr(all(target_arch = "wasm32", target_feature = "simd128"), path = "wasm.rs")]
+mod native;
 mod scalar;
-#[cfg(target_arch = "x86_64")]
-mod x86;
+#[cfg(test)]
+mod tests;
 
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, Ordering};
@@ -21,7 +35,6 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn sub(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
     /// Correctly rounded.
-    #[allow(dead_code, reason = "for the query path, which does not use it yet")]
     fn div(self, other: Self) -> Self;
     /// `if self < other { self } else { other }`: a NaN in `self` gives `other`.
     fn min(self, other: Self) -> Self;
@@ -31,7 +44,6 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     /// `self`, with the other sign where `sign` is negative.
     fn flipped_by(self, sign: Self) -> Self;
     /// `self`, whose sign bit is clear, with that of `sign`.
-    #[allow(dead_code, reason = "as above")]
     fn with_sign_of(self, sign: Self) -> Self;
     /// `self * factor - other`, with one rounding or two: not the same bits from every backend, so
     /// only where the bound allows for both and nothing of it is answered.
@@ -42,7 +54,12 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     fn less_or_equal(self, other: Self) -> u32;
     fn store(self, out: &mut [f32; N]);
     /// Writes the lanes of `mask` in order to the front of `out`, and anything behind them.
-    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]);
+    #[inline(always)]
+    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]) {
+        let mut lanes = [0.0; N];
+        self.store(&mut lanes);
+        scalar::compress(&lanes, mask, out);
+    }
 }
 
 /// `a * b - c`, fused where that is faster if `FUSED` says that the bits need not be those of others.
@@ -57,7 +74,10 @@ pub(crate) trait Width<const N: usize>: Copy {
     fn splat(self, x: f32) -> Self::V;
     fn load(self, lanes: &[f32; N]) -> Self::V;
     /// Writes the words of `mask` in order to the front of `out`, and anything behind them.
-    fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]);
+    #[inline(always)]
+    fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]) {
+        scalar::compress(words, mask, out);
+    }
 
     /// Of the lanes of `mask`, counted from the lowest, the number of one in which `near` is nearly least, and
     /// its word: the first of the least as integers, when their number replaces the lowest bits.
@@ -76,7 +96,12 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
 
     /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
     /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
-    fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V;
+    #[inline(always)]
+    fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V {
+        let mut lanes = [0.0; 16];
+        table.store(&mut lanes);
+        self.load(&core::array::from_fn::<f32, 16, _>(|i| lanes[corner(list, i)]))
+    }
 
     /// Moves those entries whose `near` is not above `t_bound` to the front of both columns, in
     /// their order, and returns how many these are.
@@ -109,7 +134,7 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
 pub enum Backend {
     /// Portable code.
     Scalar = 1,
-    /// 128 bits: SSE2.
+    /// 128 bits: SSE2, NEON on AArch64, or `simd128` in WebAssembly that is compiled for it.
     Bits128 = 2,
     /// 256 bits: AVX2 and FMA.
     Avx2 = 3,
@@ -124,10 +149,7 @@ impl Backend {
 
     /// The best that this processor has.
     pub fn detected() -> Backend {
-        #[cfg(target_arch = "x86_64")]
-        return x86::detect();
-        #[cfg(not(target_arch = "x86_64"))]
-        return Backend::Scalar;
+        native::detect()
     }
 
     /// What queries use now.
@@ -167,17 +189,8 @@ pub(crate) trait Kernel {
 /// Runs `kernel` with the best instructions there are.
 #[inline]
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
-    match Backend::current() {
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: `current` is never above what `detected` found on this processor.
-        Backend::Avx512 => unsafe { x86::Avx512::assume() }.run(kernel),
-        #[cfg(target_arch = "x86_64")]
-        // SAFETY: as above.
-        Backend::Avx2 => unsafe { x86::Avx2::assume() }.run(kernel),
-        #[cfg(target_arch = "x86_64")]
-        Backend::Bits128 => x86::Sse2.run(kernel),
-        _ => Scalar.run(kernel),
-    }
+    // SAFETY: `current` is never above what `detected` found on this processor.
+    unsafe { native::run_with(Backend::current(), kernel) }
 }
 
 /// The lane that `list` names for lane `i`: see [`Simd::corners`].

@@ -42,7 +42,8 @@ pub(super) fn nearest<const N: usize>(
     let (mut rest, mut number, mut least, mut nearest) = (mask, 0, i32::MAX, (0, u32::MAX));
     while let Some(t) = near.get(rest.trailing_zeros() as usize) {
         let key = t.to_bits() as i32 & !numbers | number;
-        if key < least {
+        // Keys differ, so this is the first one also where all are as large as can be.
+        if key <= least {
             (least, nearest) = (key, (number as usize, words[rest.trailing_zeros() as usize]));
         }
         number += 1;

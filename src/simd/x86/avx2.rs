@@ -1,0 +1,139 @@
+//! 256 bits: AVX2 and FMA.
+
+#![allow(
+    clippy::multiple_unsafe_ops_per_block,
+    reason = "one proof covers all instructions of an operation"
+)]
+
+use core::arch::x86_64::*;
+
+use super::sse2::F4;
+use crate::simd::doubled::{Two, halves};
+use crate::simd::{Kernel, Lanes, Simd, Width};
+
+/// Proof that this processor runs AVX2 and FMA.
+#[derive(Clone, Copy)]
+pub(super) struct Avx2(());
+
+impl Avx2 {
+    /// # Safety
+    ///
+    /// The processor has AVX2 and FMA.
+    pub unsafe fn assume() -> Self {
+        Avx2(())
+    }
+}
+
+/// Eight lanes of AVX2: such a value is made from a token, so the instructions exist.
+#[derive(Clone, Copy)]
+pub(super) struct F8(pub(super) __m256);
+
+width!(Avx2 4 F4 _mm_set1_ps _mm_loadu_ps);
+width!(Avx2 8 F8 _mm256_set1_ps _mm256_loadu_ps);
+doubled!(Avx2 16 of 8 F8);
+
+/// Of 16 lanes the eight with these numbers, in the four lowest bits.
+///
+/// # Safety
+///
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn pick(table: Two<F8>, numbers: __m256i) -> F8 {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let below = _mm256_permutevar8x32_ps(table.0.0, numbers);
+        let above = _mm256_permutevar8x32_ps(table.1.0, numbers);
+        // The fourth bit of a number becomes the sign.
+        let upper = _mm256_castsi256_ps(_mm256_slli_epi32::<28>(numbers));
+        F8(_mm256_blendv_ps(below, above, upper))
+    }
+}
+
+/// How far the numbers of eight lanes, the first four bytes for even ones, are to be shifted.
+const SHIFTS: [i32; 8] = [0, 0, 4, 4, 8, 8, 12, 12];
+
+impl Simd for Avx2 {
+    const FEW: u32 = 0;
+
+    #[inline(always)]
+    fn corners(self, table: Two<F8>, list: &[u8; 8]) -> Two<F8> {
+        // SAFETY: the token proves AVX2.
+        unsafe {
+            let all = _mm256_set1_epi64x(i64::from_le_bytes(*list));
+            let shifts = _mm256_loadu_si256(SHIFTS.as_ptr().cast());
+            let low = _mm256_srlv_epi32(all, shifts);
+            let high = _mm256_srlv_epi32(all, _mm256_add_epi32(shifts, _mm256_set1_epi32(16)));
+            Two(pick(table, low), pick(table, high))
+        }
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(self, what: &T) {
+        super::prefetch(what);
+    }
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+        fn with<K: Kernel>(s: Avx2, kernel: K) -> K::Output {
+            kernel.run(s)
+        }
+        // SAFETY: the token proves AVX2 and FMA; processors with these have the rest, which is
+        // checked where the token is made.
+        unsafe { with(self, kernel) }
+    }
+}
+
+impl Lanes<8> for F8 {
+    pairwise! {
+        add: _mm256_add_ps;
+        sub: _mm256_sub_ps;
+        mul: _mm256_mul_ps;
+        div: _mm256_div_ps;
+        // These two return their second operand when either is a NaN, and for zeros of two signs.
+        min: _mm256_min_ps;
+        max: _mm256_max_ps;
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: a value of this type proves AVX2.
+        F8(unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0) })
+    }
+
+    #[inline(always)]
+    fn flipped_by(self, sign: Self) -> Self {
+        // SAFETY: a value of this type proves AVX2.
+        F8(unsafe { _mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), sign.0)) })
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        // SAFETY: a value of this type proves AVX2.
+        F8(unsafe { _mm256_or_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), sign.0)) })
+    }
+
+    #[inline(always)]
+    fn fast_mul_sub(self, factor: Self, other: Self) -> Self {
+        // SAFETY: a value of this type proves AVX2 and FMA.
+        F8(unsafe { _mm256_fmsub_ps(self.0, factor.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        // SAFETY: a value of this type proves AVX2.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+    }
+
+    #[inline(always)]
+    fn less_or_equal(self, other: Self) -> u32 {
+        // SAFETY: a value of this type proves AVX2.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, other.0)) as u32 }
+    }
+
+    #[inline(always)]
+    fn store(self, out: &mut [f32; 8]) {
+        // SAFETY: `out` has room for eight floats.
+        unsafe { _mm256_storeu_ps(out.as_mut_ptr(), self.0) }
+    }
+}

@@ -1,0 +1,218 @@
+//! 512 bits: AVX-512 F, VL, DQ and BW.
+
+#![allow(
+    clippy::multiple_unsafe_ops_per_block,
+    reason = "one proof covers all instructions of an operation"
+)]
+
+use core::arch::x86_64::*;
+use core::mem::MaybeUninit;
+
+use super::avx2::F8;
+use super::sse2::F4;
+use crate::simd::{Kernel, Lanes, Simd, Width};
+
+/// Proof that this processor runs AVX-512 F, VL, DQ and BW.
+#[derive(Clone, Copy)]
+pub(super) struct Avx512(());
+
+impl Avx512 {
+    /// # Safety
+    ///
+    /// The processor has AVX-512 F, VL, DQ and BW, and so AVX2 and FMA.
+    pub unsafe fn assume() -> Self {
+        Avx512(())
+    }
+}
+
+/// Sixteen lanes of AVX-512: such a value is made from a token, so the instructions exist.
+#[derive(Clone, Copy)]
+pub(super) struct F16(__m512);
+
+width!(Avx512 4 F4 _mm_set1_ps _mm_loadu_ps);
+
+width! {
+    Avx512 8 F8 _mm256_set1_ps _mm256_loadu_ps
+
+    #[inline(always)]
+    fn compress_words(self, mask: u32, words: &[u32; 8], out: &mut [MaybeUninit<u32>; 8]) {
+        // SAFETY: the token proves AVX-512 F and VL; both arrays have eight words.
+        unsafe {
+            let all = _mm256_loadu_si256(words.as_ptr().cast());
+            let front = _mm256_maskz_compress_epi32(mask as __mmask8, all);
+            _mm256_storeu_si256(out.as_mut_ptr().cast(), front);
+        }
+    }
+}
+
+width! {
+    Avx512 16 F16 _mm512_set1_ps _mm512_loadu_ps
+
+    #[inline(always)]
+    fn compress_words(self, mask: u32, words: &[u32; 16], out: &mut [MaybeUninit<u32>; 16]) {
+        // SAFETY: the token proves AVX-512 F; both arrays have 16 words.
+        unsafe {
+            let all = _mm512_loadu_si512(words.as_ptr().cast());
+            let front = _mm512_maskz_compress_epi32(mask as __mmask16, all);
+            _mm512_storeu_si512(out.as_mut_ptr().cast(), front);
+        }
+    }
+
+    #[inline(always)]
+    fn nearest(self, mask: u32, near: F16, words: &[u32; 16]) -> (usize, u32) {
+        // SAFETY: the token proves AVX-512; both tables have 16 words.
+        unsafe {
+            let (mask, above) = (mask as __mmask16, _mm512_set1_epi32(i32::MAX));
+            let keys = _mm512_mask_compress_epi32(above, mask, _mm512_castps_si512(near.0));
+            let words = _mm512_loadu_si512(words.as_ptr().cast());
+            let words = _mm512_maskz_compress_epi32(mask, words);
+            let numbers = _mm512_loadu_si512(NUMBERS.as_ptr().cast());
+            if mask.count_ones() > 4 {
+                let keys = _mm512_andnot_si512(_mm512_set1_epi32(15), keys);
+                let key = _mm512_reduce_min_epi32(_mm512_or_si512(keys, numbers));
+                let word = _mm512_permutexvar_epi32(_mm512_set1_epi32(key), words);
+                let word = _mm_cvtsi128_si32(_mm512_castsi512_si128(word));
+                return (key as usize & 15, word as u32);
+            }
+            let keys = _mm_andnot_si128(_mm_set1_epi32(3), _mm512_castsi512_si128(keys));
+            let keys = _mm_or_si128(keys, _mm512_castsi512_si128(numbers));
+            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0x4E>(keys));
+            let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0xB1>(keys));
+            // This looks at the two lowest bits only.
+            let words = _mm_castsi128_ps(_mm512_castsi512_si128(words));
+            let word = _mm_castps_si128(_mm_permutevar_ps(words, keys));
+            (_mm_cvtsi128_si32(keys) as usize & 3, _mm_cvtsi128_si32(word) as u32)
+        }
+    }
+}
+
+const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
+impl Simd for Avx512 {
+    const FEW: u32 = 0;
+
+    #[inline(always)]
+    fn corners(self, table: F16, list: &[u8; 8]) -> F16 {
+        const SHIFTS: [i32; 16] = [0, 0, 4, 4, 8, 8, 12, 12, 16, 16, 20, 20, 24, 24, 28, 28];
+        // SAFETY: the token proves AVX-512 F. A permutation looks at the four lowest bits only.
+        unsafe {
+            let all = _mm512_set1_epi64(i64::from_le_bytes(*list));
+            let shifts = _mm512_loadu_si512(SHIFTS.as_ptr().cast());
+            F16(_mm512_permutexvar_ps(_mm512_srlv_epi32(all, shifts), table.0))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn keep_up_to(
+        self,
+        near: &mut [MaybeUninit<f32>],
+        refs: &mut [MaybeUninit<u32>],
+        t_bound: f32,
+    ) -> usize {
+        let count = near.len().min(refs.len());
+        let (near, refs) = (near.as_mut_ptr().cast::<f32>(), refs.as_mut_ptr().cast::<i32>());
+        let (mut from, mut kept) = (0, 0);
+        while from < count {
+            let lanes = (1u32 << (count - from).min(16)) - 1;
+            // SAFETY: the token proves AVX-512. Lanes below `count` are read and written, no others;
+            // what is written lies in front of what is still to be read.
+            unsafe {
+                let lanes = lanes as __mmask16;
+                let t = _mm512_maskz_loadu_ps(lanes, near.add(from));
+                let words = _mm512_maskz_loadu_epi32(lanes, refs.add(from));
+                let bound = _mm512_set1_ps(t_bound);
+                let keep = _mm512_mask_cmp_ps_mask::<_CMP_NGT_UQ>(lanes, t, bound);
+                let front = ((1u32 << keep.count_ones()) - 1) as __mmask16;
+                let t = _mm512_maskz_compress_ps(keep, t);
+                let words = _mm512_maskz_compress_epi32(keep, words);
+                _mm512_mask_storeu_ps(near.add(kept), front, t);
+                _mm512_mask_storeu_epi32(refs.add(kept), front, words);
+                kept += keep.count_ones() as usize;
+            }
+            from += 16;
+        }
+        kept
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(self, what: &T) {
+        super::prefetch(what);
+    }
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        #[target_feature(
+            enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt"
+        )]
+        fn with<K: Kernel>(s: Avx512, kernel: K) -> K::Output {
+            kernel.run(s)
+        }
+        // SAFETY: the token proves AVX-512; processors with it have the rest, which is checked where
+        // the token is made.
+        unsafe { with(self, kernel) }
+    }
+}
+
+impl Lanes<16> for F16 {
+    pairwise! {
+        add: _mm512_add_ps;
+        sub: _mm512_sub_ps;
+        mul: _mm512_mul_ps;
+        div: _mm512_div_ps;
+        // These two return their second operand when either is a NaN, and for zeros of two signs.
+        min: _mm512_min_ps;
+        max: _mm512_max_ps;
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: a value of this type proves AVX-512.
+        F16(unsafe { _mm512_abs_ps(self.0) })
+    }
+
+    #[inline(always)]
+    fn flipped_by(self, sign: Self) -> Self {
+        // SAFETY: a value of this type proves AVX-512 F and DQ.
+        F16(unsafe { _mm512_xor_ps(self.0, _mm512_and_ps(_mm512_set1_ps(-0.0), sign.0)) })
+    }
+
+    #[inline(always)]
+    fn with_sign_of(self, sign: Self) -> Self {
+        // SAFETY: a value of this type proves AVX-512 F and DQ.
+        F16(unsafe { _mm512_or_ps(self.0, _mm512_and_ps(_mm512_set1_ps(-0.0), sign.0)) })
+    }
+
+    #[inline(always)]
+    fn fast_mul_sub(self, factor: Self, other: Self) -> Self {
+        // SAFETY: a value of this type proves AVX-512.
+        F16(unsafe { _mm512_fmsub_ps(self.0, factor.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        // SAFETY: a value of this type proves AVX-512.
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    fn less_or_equal(self, other: Self) -> u32 {
+        // SAFETY: a value of this type proves AVX-512.
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(self.0, other.0)) }
+    }
+
+    #[inline(always)]
+    fn store(self, out: &mut [f32; 16]) {
+        // SAFETY: `out` has room for 16 floats.
+        unsafe { _mm512_storeu_ps(out.as_mut_ptr(), self.0) }
+    }
+
+    #[inline(always)]
+    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; 16]) {
+        // SAFETY: a value of this type proves AVX-512; `out` has room for 16 floats. In a register
+        // first: compressing to memory is slow on some processors.
+        unsafe {
+            let front = _mm512_maskz_compress_ps(mask as __mmask16, self.0);
+            _mm512_storeu_ps(out.as_mut_ptr().cast(), front);
+        }
+    }
+}
