@@ -9,7 +9,7 @@ use crate::simd::{Lanes, Simd, Width};
 
 /// Children to come back to, each with the `t` at which the ray enters it: two columns.
 ///
-/// All entries below `count` are written. A push writes as many lanes as a vector has and then counts those
+/// All refs below `count` are written, and all `near` too unless children were pushed without. A push writes as many lanes as a vector has and then counts those
 /// that matter, so that it takes no branch.
 pub(super) struct Stack<const ROOM: usize> {
     near: [MaybeUninit<f32>; ROOM],
@@ -98,7 +98,8 @@ impl<const ROOM: usize> Stack<ROOM> {
     #[inline(always)]
     pub fn cull<S: Simd>(&mut self, s: S, t_bound: f32) {
         let (near, refs) = (&mut self.near[..self.count], &mut self.refs[..self.count]);
-        // SAFETY: entries below `count` were written by `push`, or moved down from such ones.
+        // SAFETY: entries below `count` were written by `push`, or moved down from such ones; queries that
+        // push without `near` have a bound that does not move, and do not come here.
         self.count = unsafe { s.keep_up_to(near, refs, t_bound) };
     }
 

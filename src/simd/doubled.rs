@@ -57,6 +57,7 @@ two!(8 of 4);
 two!(16 of 8);
 
 /// The halves of an array.
+#[allow(clippy::multiple_unsafe_ops_per_block, reason = "one proof covers both halves")]
 pub(super) fn halves<const N: usize, const HALF: usize>(lanes: &[f32; N]) -> [&[f32; HALF]; 2] {
     const { assert!(N == 2 * HALF) }
     // SAFETY: the array is `2 * HALF` floats, and arrays of floats are aligned as floats.

@@ -1,0 +1,71 @@
+//! What `f32` knows of one triangle, for the mode that decides by it.
+
+use glam::Vec3;
+
+use super::TINY;
+use super::meetings::Depths;
+use super::triangle::One;
+use super::vector::{cross, dot, sum_abs};
+use crate::math::rounding::UNIT32;
+use crate::ray::PreparedRay;
+
+/// One triangle in `f32`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TriangleDetail {
+    /// The frame's `t`, between those of the nearest and the farthest vertex.
+    pub t: f32,
+    /// What it may be off; infinite where the triangle is seen edge-on.
+    pub t_error: f32,
+    /// Weights of the second and the third vertex.
+    pub weights: [f32; 2],
+    /// Whether the line meets the front, where rounding leaves no doubt.
+    pub front: Option<bool>,
+}
+
+/// What the filter knows of a triangle that it does not reject.
+pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
+    let One { areas, meetings, first_depth } =
+        One::alone(ray, &Depths::new(ray, ray.t_max), corners);
+    let [[_], [over_b], [over_c]] = areas.over;
+    let ([area_error], [total], [rise]) = (areas.error, meetings.total, meetings.rise);
+    let ([nearest], [farthest]) = (meetings.nearest_depth, meetings.farthest_depth);
+    // The total carries the errors of three areas, and less than as much again of its own.
+    let is_clear = total.abs() > 6.0 * area_error;
+    // A NaN, from 0 / 0, loses to the depths of the vertices.
+    let depth = (first_depth + rise / total.abs()).max(nearest).min(farthest);
+    let rate = ray.shear.depth_rate;
+    let (t, t_error) = match plane(ray, corners) {
+        Some((t, t_error)) => ((t * rate).max(nearest).min(farthest) / rate, t_error),
+        None => (depth / rate, f32::INFINITY),
+    };
+    TriangleDetail {
+        t,
+        t_error,
+        weights: [over_b / total, over_c / total],
+        front: is_clear.then_some((total < 0.0) == (ray.shear.depth_sign > 0.0)),
+    }
+}
+
+/// The frame's `t` at which the ray meets the plane of the triangle, and a bound on its error; `None` when
+/// they are nearly parallel.
+///
+/// Far tighter than what the areas give for a ray that starts on a large triangle: the error grows with the
+/// distance to the first vertex instead of with the triangle. The computation is that of
+/// [`interval`](crate::interval) with another unit, and its bounds.
+fn plane(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Option<(f32, f32)> {
+    let [a, b, c] = corners.map(|vertex| Vec3::from(vertex) * ray.scale);
+    let (e1, e2) = (b - a, c - a);
+    let n = cross(e1, e2);
+    let d = Vec3::from_slice(&ray.direction);
+    let to_plane = a - Vec3::from_slice(&ray.origin);
+    let along = dot(d, n);
+    let size = 8.5 * UNIT32 * sum_abs(e1) * sum_abs(e2);
+    let along_error = sum_abs(d) * size + TINY;
+    if !(4.0 * along_error < along.abs()) {
+        return None;
+    }
+    let t = dot(to_plane, n) / along;
+    // Half as much again for the divisor's own error, and a few roundings of the quotient and limits.
+    let error = (sum_abs(to_plane) * size + TINY + t.abs() * along_error) / along.abs();
+    Some((t, 1.5 * error + 8.0 * UNIT32 * t.abs()))
+}
