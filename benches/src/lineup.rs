@@ -27,6 +27,10 @@ pub enum Class {
     Single(Precision),
     /// Our BVH, all rays in one call.
     Batch(Precision),
+    /// Our BVH of the quality fast, one ray at a time.
+    Fast,
+    /// Our BVH of the quality best, one ray at a time.
+    Best,
     /// Our grid, one ray at a time.
     Grid(Precision),
     /// Our C face.
@@ -54,7 +58,13 @@ impl Class {
     pub fn is_ours(self) -> bool {
         matches!(
             self,
-            Class::Single(_) | Class::Batch(_) | Class::Grid(_) | Class::Face | Class::Noise
+            Class::Single(_)
+                | Class::Batch(_)
+                | Class::Fast
+                | Class::Best
+                | Class::Grid(_)
+                | Class::Face
+                | Class::Noise
         )
     }
 

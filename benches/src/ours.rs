@@ -4,8 +4,8 @@ use std::rc::Rc;
 
 use anyhow::{Context, Result};
 use raykern::{
-    Accel, BuildError, BuildOptions, Hit, Layout, OwnedAccel, PlainList, Precision, QueryOptions,
-    Ray,
+    Accel, BuildError, BuildOptions, Hit, Layout, OwnedAccel, PlainList, Precision, Quality,
+    QueryOptions, Ray,
 };
 use raykern_harness::model::Model;
 
@@ -13,7 +13,7 @@ use crate::lineup::{Class, Lineup, Tracer};
 use crate::options::Options;
 use crate::watch::{Watch, timed_build};
 
-/// Adds the BVH in every layout asked for, and the grid.
+/// Adds the BVH in every layout asked for, in the other qualities too, and the grid.
 pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) -> Result<()> {
     for (name, layout) in options.layouts() {
         let name = match layout {
@@ -27,8 +27,18 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) -> Result<()>
             }
             (Err(BuildError::Unsupported(_)), _) => {
                 lineup.notes.push(format!("{name}: not in this version"));
+                continue;
             }
             (Err(error), _) => return Err(error).context(name),
+        }
+        for (quality, suffix, class) in
+            [(Quality::Fast, "fast", Class::Fast), (Quality::Best, "best", Class::Best)]
+        {
+            let name = format!("{name}-{suffix}");
+            let (built, seconds) = timed_build(|| bvh_of(model, layout, quality));
+            let built = Rc::new(built.with_context(|| name.clone())?);
+            lineup.built(&name, seconds, Some(built.accel().block().len()));
+            lineup.add(&name, class, Single::new(&built, Precision::Exact));
         }
     }
     let (grid, seconds) =
@@ -42,7 +52,11 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) -> Result<()>
 
 /// A BVH, or for a handful of triangles the list that stands in for it.
 pub fn bvh(model: &Model, layout: Layout) -> Result<OwnedAccel, BuildError> {
-    let options = BuildOptions { layout, ..BuildOptions::default() };
+    bvh_of(model, layout, Quality::Balanced)
+}
+
+fn bvh_of(model: &Model, layout: Layout, quality: Quality) -> Result<OwnedAccel, BuildError> {
+    let options = BuildOptions { layout, quality, ..BuildOptions::default() };
     model.with_scene(|scene| OwnedAccel::bvh(scene, &options))
 }
 
