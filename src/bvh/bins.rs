@@ -1,7 +1,7 @@
 //! Where to part the refs of a large node: SAH over bins.
 
+use super::refs::PrimRef;
 use super::split::{Areas, Box4, Extent, centre, greater, lesser};
-use super::tree::PrimRef;
 
 /// Bins along each axis at most.
 const BINS: usize = 32;

@@ -2,7 +2,9 @@
 
 use super::How;
 use super::MAX_DEPTH;
-use super::tree::{Grown, Limits, PrimRef, gather, grow, leaf_budget};
+use super::branch::grow;
+use super::refs::{PrimRef, gather};
+use super::tree::{Grown, Limits, leaf_budget};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;

@@ -181,9 +181,11 @@ struct Content {
 mod tests {
     use super::*;
     use crate::bvh::bins::Effort;
+    use crate::bvh::branch::grow;
     use crate::bvh::collapse::choose;
+    use crate::bvh::refs::PrimRef;
     use crate::bvh::split::Areas;
-    use crate::bvh::tree::{Limits, PrimRef, grow};
+    use crate::bvh::tree::Limits;
     use crate::caller::Caller;
     use crate::math::Aabb;
     use crate::prim::Shapes;

@@ -2,10 +2,12 @@
 //! tree of bundles.
 
 mod bins;
+mod branch;
 mod collapse;
 mod compact;
 mod emit;
 mod fits;
+mod refs;
 mod split;
 mod stack;
 mod sweep;

@@ -1,6 +1,6 @@
 //! What splits are judged by: boxes, their areas, and where the refs of a node lie.
 
-use super::tree::PrimRef;
+use super::refs::PrimRef;
 use crate::math::Aabb;
 
 /// A box with a fourth lane that means nothing: four lanes are one vector on most machines.

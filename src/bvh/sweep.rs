@@ -1,7 +1,7 @@
 //! Where to part the few refs of a small node: SAH over every place between two of them.
 
+use super::refs::PrimRef;
 use super::split::{Areas, Box4, Extent, centre};
-use super::tree::PrimRef;
 
 /// Of at most this many refs every split along an axis is looked at.
 pub(crate) const FEW: usize = 8;

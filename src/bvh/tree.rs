@@ -1,78 +1,13 @@
-//! The binary tree over boxes, before there are leaf blocks.
-
-#![allow(unsafe_code, reason = "a promise about the layout drawn here")]
+//! The binary tree over boxes, before there are leaf blocks: how a node is split, and a subtree grown.
 
 use super::MAX_DEPTH;
 use super::bins::{Bins, Effort, best_plane};
-use super::split::{Areas, Box4, Extent};
+use super::branch::Branch;
+use super::refs::PrimRef;
+use super::split::{Areas, Extent};
 use super::sweep::{FEW, sweep};
-use crate::block::{BvhNode, Census};
-use crate::caller::Caller;
+use crate::block::BvhNode;
 use crate::math::Aabb;
-use crate::prim::{Shape, for_each_prim_in};
-use crate::scene::Scene;
-use crate::storage::Plain;
-
-/// A primitive as the builder sees it.
-///
-/// ```text
-/// byte 0       12   16      28          32
-///      | lower | id | upper | is sphere |
-/// ```
-///
-/// The id stands in the fourth lane of the box, below `2^30` and with that bit set. So all lanes are
-/// zero or normal floats: computing with subnormal ones is slow.
-#[derive(Clone, Copy)]
-#[repr(C)]
-pub(crate) struct PrimRef {
-    pub bounds: Box4,
-}
-const _: () = assert!(size_of::<PrimRef>() == 32);
-
-// SAFETY: eight numbers of equal size, so no padding.
-unsafe impl Plain for PrimRef {}
-
-impl PrimRef {
-    /// Where the id is among the words of a ref.
-    pub const ID: usize = 3;
-
-    /// Set in that word.
-    const NORMAL: u32 = 1 << 30;
-
-    /// The id in that word.
-    pub fn id_of(word: u32) -> u32 {
-        word & !Self::NORMAL
-    }
-
-    pub fn new(id: u32, aabb: &Aabb, sphere: bool) -> Self {
-        let lane = |[x, y, z]: [f32; 3], word: u32| {
-            // -0 becomes +0.
-            [x + 0.0, y + 0.0, z + 0.0, f32::from_bits(word)]
-        };
-        let sphere = if sphere { 1.0f32.to_bits() } else { 0 };
-        let (lower, upper) = (lane(aabb.lower, id | Self::NORMAL), lane(aabb.upper, sphere));
-        PrimRef { bounds: Box4 { lower, upper } }
-    }
-
-    pub fn id(&self) -> u32 {
-        Self::id_of(self.bounds.lower[3].to_bits())
-    }
-
-    pub fn is_sphere(&self) -> bool {
-        self.bounds.upper[3].to_bits() != 0
-    }
-}
-
-/// Writes a ref for each primitive that can be hit.
-pub(crate) fn gather(scene: &Scene, census: &Census, refs: &mut [PrimRef]) {
-    let mut free = refs.iter_mut();
-    for_each_prim_in(scene, 0..u32::MAX, census.ignored_count == 0, |prim| {
-        if let Some(r) = free.next() {
-            let sphere = matches!(prim.shape, Shape::Sphere { .. });
-            *r = PrimRef::new(prim.id, &prim.shape.aabb(), sphere);
-        }
-    });
-}
 
 /// A leaf that has no lanes yet: `first` is its first ref; `lanes` holds the number of its refs, and
 /// their kind in bit 8.
@@ -110,20 +45,20 @@ const STEP_COST: f32 = 2.0;
 
 /// A subtree to build: the refs `first .. first + count` under node `node`.
 #[derive(Clone, Copy)]
-struct Task {
-    node: u32,
+pub(super) struct Task {
+    pub node: u32,
     /// Where the nodes below it begin.
-    pairs: u32,
-    first: usize,
-    count: usize,
-    depth: usize,
+    pub pairs: u32,
+    pub first: usize,
+    pub count: usize,
+    pub depth: usize,
     /// Leaves it may have.
-    budget: usize,
-    extent: Extent,
+    pub budget: usize,
+    pub extent: Extent,
 }
 
 /// Where a node's refs are parted, the fewest leaves that either side needs, and their boxes.
-struct Split {
+pub(super) struct Split {
     left_count: usize,
     least: [usize; 2],
     sides: [Extent; 2],
@@ -157,121 +92,16 @@ fn levels_to_halve(count: usize, leaf_max: usize) -> usize {
     leaves.trailing_zeros() as usize + 1
 }
 
-/// Builds the tree over `refs`, of which there is at least one, and brings them into the order of
-/// the leaves. Returns the number of nodes.
-///
-/// Nodes are laid out as [`tree_is_sound`](super::tree_is_sound) expects them; leaves are
-/// [`Grown`] until they are packed. `nodes` has two entries for each leaf of `budget`.
-///
-/// A few large splits part the tree into branches, which grow independently: each in the place that its
-/// budget of leaves reserves for it, so that the tree is the same in whatever order they grow. The
-/// places that stay free are closed at the end.
-///
-/// Source: \[Wald07\], with leaves limited in number as the memory is.
-pub(crate) fn grow(
-    nodes: &mut [BvhNode],
-    refs: &mut [PrimRef],
-    limits: &Limits,
-    caller: &Caller,
-) -> Option<usize> {
-    let extent = Extent::around(refs);
-    let areas = Areas::new(&extent.bounds.aabb());
-    let splitter = Splitter { limits, areas };
-    let root = Task {
-        node: 0,
-        pairs: 2,
-        first: 0,
-        count: refs.len(),
-        depth: 0,
-        budget: limits.leaves,
-        extent,
-    };
-    let mut tasks = [root; BRANCHES];
-    let count = splitter.branch_out(nodes, refs, &mut tasks)?;
-    let tasks = &tasks[..count];
-    let mut branches: [Option<Branch>; BRANCHES] = [const { None }; BRANCHES];
-    let (mut free_nodes, mut free_refs) = (&mut *nodes, refs);
-    let (mut at_node, mut at_ref) = (0, 0);
-    for (task, branch) in tasks.iter().zip(&mut branches) {
-        let (first, room) = (task.pairs as usize, 2 * (task.budget - 1));
-        let rest = core::mem::take(&mut free_nodes).split_at_mut_checked(first - at_node)?.1;
-        let (nodes, rest) = rest.split_at_mut_checked(room)?;
-        (free_nodes, at_node) = (rest, first + room);
-        let rest = core::mem::take(&mut free_refs).split_at_mut_checked(task.first - at_ref)?.1;
-        let (refs, rest) = rest.split_at_mut_checked(task.count)?;
-        (free_refs, at_ref) = (rest, task.first + task.count);
-        *branch = Some(Branch { task: *task, nodes, refs, root: None });
-    }
-    caller.for_each(&mut branches[..count], |branch| {
-        if let Some(branch) = branch {
-            branch.root = splitter.grow_branch(branch);
-        }
-    });
-    let mut roots = [BvhNode::inner(&Aabb::EMPTY, 0); BRANCHES];
-    for (root, branch) in roots.iter_mut().zip(branches.iter().flatten()) {
-        *root = branch.root?;
-    }
-    for (task, root) in tasks.iter().zip(roots) {
-        *nodes.get_mut(task.node as usize)? = root;
-    }
-    close_gaps(nodes)
-}
-
-/// Branches at most. How many there are must not depend on the threads, as the tree must not.
-const BRANCHES: usize = 64;
-/// Branches of fewer refs are not parted further.
-const BRANCH: usize = 2048;
-
-/// A subtree of its own, with its place.
-struct Branch<'b> {
-    task: Task,
-    nodes: &'b mut [BvhNode],
-    refs: &'b mut [PrimRef],
-    /// Its root, when it has grown.
-    root: Option<BvhNode>,
-}
-
 /// How nodes are split.
 #[derive(Clone, Copy)]
-struct Splitter<'l> {
-    limits: &'l Limits,
-    areas: Areas,
+pub(super) struct Splitter<'l> {
+    pub limits: &'l Limits,
+    pub areas: Areas,
 }
 
 impl Splitter<'_> {
-    /// Splits the largest task again and again, until there are enough or all are small; returns their
-    /// number. They stay in the order of the tree.
-    fn branch_out(
-        self,
-        nodes: &mut [BvhNode],
-        refs: &mut [PrimRef],
-        tasks: &mut [Task; BRANCHES],
-    ) -> Option<usize> {
-        let grain = (refs.len() / 48).max(BRANCH);
-        let mut bins = Bins::EMPTY;
-        let mut count = 1;
-        while count < BRANCHES {
-            let largest = (0..count).rev().max_by_key(|i| tasks[*i].count)?;
-            let task = tasks[largest];
-            if task.count <= grain {
-                break;
-            }
-            let range = refs.get_mut(task.first..task.first + task.count)?;
-            // More than a leaf, so it is split.
-            let split = self.part(range, &task, &mut bins)?;
-            let node = nodes.get_mut(task.node as usize)?;
-            *node = BvhNode::inner(&task.extent.bounds.aabb(), task.pairs);
-            let [left, right] = task.children(&split, task.pairs);
-            tasks.copy_within(largest + 1..count, largest + 2);
-            tasks[largest] = left;
-            tasks[largest + 1] = right;
-            count += 1;
-        }
-        Some(count)
-    }
-
     /// Grows a branch; returns its root.
-    fn grow_branch(self, branch: &mut Branch) -> Option<BvhNode> {
+    pub fn grow_branch(self, branch: &mut Branch) -> Option<BvhNode> {
         let Branch { task: whole, nodes, refs, .. } = branch;
         let mut root = None;
         let mut bins = Bins::EMPTY;
@@ -308,7 +138,7 @@ impl Splitter<'_> {
 
 impl Task {
     /// The tasks of the sides, whose nodes are the pair at `pair`.
-    fn children(&self, split: &Split, pair: u32) -> [Task; 2] {
+    pub fn children(&self, split: &Split, pair: u32) -> [Task; 2] {
         let depth = self.depth + 1;
         let (count, budget) = (split.left_count, share(self, split));
         let [left, right] = split.sides;
@@ -322,31 +152,6 @@ impl Task {
     }
 }
 
-/// Moves pairs of children down to where the one before ends; returns the number of nodes.
-fn close_gaps(nodes: &mut [BvhNode]) -> Option<usize> {
-    let mut stack = [0u32; MAX_DEPTH];
-    let (mut pending, mut used, mut at) = (0, 2, 0u32);
-    loop {
-        let node = nodes.get_mut(at as usize)?;
-        if node.is_leaf() {
-            if pending == 0 {
-                return Some(used as usize);
-            }
-            pending -= 1;
-            at = stack[pending];
-            continue;
-        }
-        let pair = node.first as usize;
-        node.first = used;
-        // Pairs lie in the order of this walk, so the place is this pair's own, or one moved before.
-        nodes.copy_within(pair..pair + 2, used as usize);
-        *stack.get_mut(pending)? = used + 1;
-        pending += 1;
-        at = used;
-        used += 2;
-    }
-}
-
 /// The leaves that the left child may have: its share by count, but enough for either side.
 fn share(task: &Task, split: &Split) -> usize {
     let [least, least_right] = split.least;
@@ -357,7 +162,7 @@ fn share(task: &Task, split: &Split) -> usize {
 
 impl Splitter<'_> {
     /// Parts the refs of a node in two, or decides for a leaf.
-    fn part(self, refs: &mut [PrimRef], task: &Task, bins: &mut Bins) -> Option<Split> {
+    pub fn part(self, refs: &mut [PrimRef], task: &Task, bins: &mut Bins) -> Option<Split> {
         let (Limits { leaf_max, mixed, deep, effort, .. }, areas) = (*self.limits, self.areas);
         let count = refs.len();
         let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
@@ -422,6 +227,8 @@ fn split_at(refs: &[PrimRef], left_count: usize, least: [usize; 2]) -> Split {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::branch::grow;
+    use crate::caller::Caller;
 
     #[test]
     fn budgets_are_enough_for_halving() {

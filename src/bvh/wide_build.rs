@@ -1,11 +1,13 @@
 //! The wide layouts: from a scene to bundles in the caller's memory.
 
 use super::How;
+use super::branch::grow;
 use super::collapse::choose;
 use super::compact;
 use super::emit::{BEGINS, Chosen, Sizes};
+use super::refs::{PrimRef, gather};
 use super::split::Areas;
-use super::tree::{Limits, PrimRef, gather, grow, leaf_budget};
+use super::tree::{Limits, leaf_budget};
 use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
