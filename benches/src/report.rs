@@ -56,21 +56,22 @@ pub fn scene(result: &SceneResult) {
     table(result, "answers unlike ours", |_, method| {
         (method.differing > 0).then(|| method.differing.to_string())
     });
-    let visits: [(&str, fn(&Counts) -> u64); 4] = [
-        ("(bvh: nodes or bundles a ray)", |counts| counts.steps),
-        ("(bvh: leaf blocks a ray)", |counts| counts.blocks),
-        ("(bvh: t in f64 a ray)", |counts| counts.intervals),
-        ("(bvh: decisions in integers a ray)", |counts| counts.exact + counts.roundings),
-    ];
-    for (name, count) in visits {
-        print!("  {name:<36}");
-        let each = |kind: &KindResult| count(&kind.visits) as f64 / kind.rays.max(1) as f64;
-        result.kinds.iter().for_each(|kind| print!("{:>11.3}", each(kind)));
-        println!();
-    }
+    visits(result, "nodes or bundles", |counts| counts.steps);
+    visits(result, "leaf blocks", |counts| counts.blocks);
+    visits(result, "t in f64", |counts| counts.intervals);
+    visits(result, "decisions in integers", |counts| counts.exact + counts.roundings);
     print!("  {:<36}", "(rays that hit, %)");
     result.kinds.iter().for_each(|kind| print!("{:>11.1}", 100.0 * kind.hit_share));
     println!("\n");
+}
+
+/// What our BVH did for a ray of each kind.
+fn visits(result: &SceneResult, what: &str, count: fn(&Counts) -> u64) {
+    print!("  {:<36}", format!("(bvh: {what} a ray)"));
+    for kind in &result.kinds {
+        print!("{:>11.3}", count(&kind.visits) as f64 / kind.rays.max(1) as f64);
+    }
+    println!();
 }
 
 /// A row for each method, a column for each kind; rows and tables without any value are left out.
