@@ -7,10 +7,11 @@ use crate::bvh::Walk;
 use crate::prim::Leaves;
 use crate::query::Query;
 use crate::ray::{NarrowSlab, PreparedRay, Ray, Slab};
-use crate::simd::{self, Backend, Kernel, Simd, Width};
+use crate::simd::{self, Kernel, Simd, Width};
 use crate::trace::{Question, ask};
 
-/// So many rays are in flight: enough to hide the way to memory, few enough to stay in the first cache.
+/// So many rays are in flight: enough to hide the way to memory, few enough to stay in the first cache. 8 to 24 are
+/// equally fast: see `docs/METHODS.md`.
 const FLIGHTS: usize = 12;
 
 /// Children that one of them may have to come back to. Nearly all rays need fewer; the others are traced
@@ -25,10 +26,9 @@ pub(crate) fn ask_all<Q: Question + Copy, A>(
     question: Q,
     keep: fn(Q::Answer) -> A,
 ) {
-    // Only for the layout that is chosen automatically, and for processors fast enough to wait for memory: every
-    // other pair of a layout and a backend would be one more copy of the code.
+    // Only for the layout that is chosen automatically: others would be more copies of the code.
     match block.bundles {
-        Bundles::Sixteen(bundles) if rays.len() > 1 && Backend::current() >= Backend::Avx2 => {
+        Bundles::Sixteen(bundles) if rays.len() > 1 => {
             simd::dispatch(AskAll { block, bundles, rays, answers, question, keep });
         }
         _ => ask_each(block, rays, answers, question, keep),
@@ -62,8 +62,7 @@ impl<Q: Question + Copy, A> Kernel for AskAll<'_, '_, Q, A> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) {
-        // A constant of the backend: nothing of this is compiled for the others.
-        if S::FEW == 0 {
+        if S::FLIES {
             self.fly(s);
         } else {
             let AskAll { block, rays, answers, question, keep, .. } = self;

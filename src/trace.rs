@@ -29,11 +29,9 @@ pub(crate) trait Question {
     fn nothing() -> Self::Answer;
 }
 
-/// The closest hit that the filter leaves.
+/// The closest hit that the filter leaves; `MEMORY` as for [`Closest`].
 #[derive(Clone, Copy)]
-///
-/// `MEMORY` as for [`Closest`].
-pub(crate) struct ClosestHit<'m, D, W, const MEMORY: usize = 1> {
+pub(crate) struct ClosestHit<'m, D, W, const MEMORY: usize> {
     filter: Filter<'m>,
     watch: W,
     decide: PhantomData<D>,
@@ -114,10 +112,10 @@ pub(crate) fn ask<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answ
 }
 
 /// One ray, waiting for a backend.
-pub(crate) struct Ask<'a, 'm, Q> {
-    pub block: &'a Block<'m>,
-    pub ray: &'a Ray,
-    pub question: Q,
+struct Ask<'a, 'm, Q> {
+    block: &'a Block<'m>,
+    ray: &'a Ray,
+    question: Q,
 }
 
 impl<Q: Question> Kernel for Ask<'_, '_, Q> {

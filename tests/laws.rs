@@ -110,20 +110,62 @@ fn flipped_windings_change_sides_and_nothing_else() {
     }
 }
 
+/// Batches of these rays give the bits of single calls, whatever is asked.
+fn same_in_a_batch(all: &All, rays: &[Ray]) {
+    let watertight = QueryOptions { precision: Precision::Watertight, ..ALL };
+    let fronts = QueryOptions { facing: Facing::Front, ..ALL };
+    for (name, accel) in all.accels() {
+        for options in [ALL, watertight, fronts] {
+            // What stands there before shows what is not written.
+            let mut hits = vec![Hit { t: -7.0, ..Hit::MISS }; rays.len()];
+            let mut occluded = vec![true; rays.len()];
+            accel.intersect_batch_with(rays, &options, &mut hits);
+            accel.occluded_batch_with(rays, &options, &mut occluded);
+            for ((ray, hit), occluded) in rays.iter().zip(hits).zip(occluded) {
+                let single = accel.intersect_with(ray, &options);
+                let expected = bits(Some(single.unwrap_or(Hit::MISS)));
+                assert_eq!(bits(Some(hit)), expected, "{name} {ray:?}");
+                assert_eq!(occluded, accel.occluded_with(ray, &options), "{name} {ray:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn batches_are_single_calls() {
     let model = blob();
-    let all = All::of(&model);
-    let rays = RayMaker::new(&model, 3).many(Family::Random, 1_000);
-    for (_, accel) in all.accels() {
-        let mut hits = vec![Hit::MISS; rays.len()];
-        let mut occluded = vec![false; rays.len()];
-        accel.intersect_batch(&rays, &mut hits);
-        accel.occluded_batch(&rays, &mut occluded);
-        for ((ray, hit), occluded) in rays.iter().zip(hits).zip(occluded) {
-            let single = accel.intersect(ray);
-            assert_eq!(bits(Some(hit)), bits(Some(single.unwrap_or(Hit::MISS))), "{ray:?}");
-            assert_eq!(occluded, single.is_some(), "{ray:?}");
+    let mut rays = RayMaker::new(&model, 3).many(Family::Random, 1_000);
+    // Among them rays that hit nothing by definition, and some in frames too far out for `f32` boxes.
+    for (i, ray) in rays.iter_mut().enumerate() {
+        match i % 9 {
+            2 => ray.direction = [0.0; 3],
+            5 => ray.origin[0] = f32::NAN,
+            7 => ray.origin[1] = 3e38,
+            _ => (),
         }
     }
+    let all = All::of(&model);
+    for count in [0, 1, 2, 11, 12, 13, 40, 1_000] {
+        same_in_a_batch(&all, &rays[..count]);
+    }
+}
+
+#[test]
+fn a_batch_is_as_right_where_rays_have_much_to_come_back_to() {
+    // Each triangle a little larger and further away than the one before, so that a ray from the smallest end leaves
+    // the others behind at every level of the tree.
+    let mut mesh = TriangleMesh { vertices: Vec::new(), indices: Vec::new() };
+    for i in 0..1_500 {
+        let (size, first) = (1.03f32.powi(i - 750), 3 * i as u32);
+        mesh.vertices.extend([
+            [-size, -size, size],
+            [2.0 * size, -size, size],
+            [-size, 2.0 * size, size],
+        ]);
+        mesh.indices.push([first, first + 1, first + 2]);
+    }
+    let model: Model = mesh.into();
+    let rays: Vec<Ray> =
+        (0..50).map(|i| Ray::new([0.0; 3], [0.001 * i as f32, 0.002 * i as f32, 1.0])).collect();
+    same_in_a_batch(&All::of(&model), &rays);
 }

@@ -9,8 +9,9 @@ use crate::simd::{Lanes, Simd, Width};
 
 /// Children to come back to, each with the `t` at which the ray enters it: two columns.
 ///
-/// All refs below `count` are written, and all `near` too unless children were pushed without. A push writes as many lanes as a vector has and then counts those
-/// that matter, so that it takes no branch.
+/// All `refs` below `count` are written, and all of `near` too unless children were
+/// [pushed without](Self::push_refs). A push writes as many lanes as a vector has and then counts those that matter,
+/// so that it takes no branch.
 pub(super) struct Stack<const ROOM: usize> {
     near: [MaybeUninit<f32>; ROOM],
     refs: [MaybeUninit<u32>; ROOM],
@@ -107,7 +108,7 @@ impl<const ROOM: usize> Stack<ROOM> {
     #[inline(always)]
     fn reference(&self, i: usize) -> u32 {
         debug_assert!(i <= self.count);
-        // SAFETY: as above; taking an entry does not unwrite it.
+        // SAFETY: both ways to push write the refs that they count; taking an entry does not unwrite it.
         unsafe { self.refs[i].assume_init() }
     }
 }

@@ -19,7 +19,7 @@ pub(crate) struct Walk<const ROOM: usize> {
 }
 
 /// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry.
-pub(crate) const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 2 * 16;
+const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 2 * 16;
 
 impl<const ROOM: usize> Walk<ROOM> {
     /// At the root.

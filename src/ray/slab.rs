@@ -84,9 +84,8 @@ impl Slab for NarrowSlab {
         let (mut near, mut far) = (self.t_min, t_bound);
         for k in 0..3 {
             let r = self.reciprocal[k];
-            let backwards = r.is_sign_negative();
             let (lower, upper) = (aabb.lower[k], aabb.upper[k]);
-            let (first, last) = if backwards { (upper, lower) } else { (lower, upper) };
+            let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
             let enter = first * r - self.near_shift[k];
             let leave = last * r - self.far_shift[k];
             near = if enter > near { enter } else { near };

@@ -94,6 +94,10 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// So few lanes of 16 are faster one by one.
     const FEW: u32;
 
+    /// Whether batches keep several rays in flight: where vectors are fast enough to wait for memory. Elsewhere it
+    /// would only be one more copy of the code.
+    const FLIES: bool = false;
+
     /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
     /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
     #[inline(always)]

@@ -54,6 +54,7 @@ const SHIFTS: [i32; 8] = [0, 0, 4, 4, 8, 8, 12, 12];
 
 impl Simd for Avx2 {
     const FEW: u32 = 0;
+    const FLIES: bool = true;
 
     #[inline(always)]
     fn corners(self, table: Two<F8>, list: &[u8; 8]) -> Two<F8> {

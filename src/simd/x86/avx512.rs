@@ -90,6 +90,7 @@ const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15
 
 impl Simd for Avx512 {
     const FEW: u32 = 0;
+    const FLIES: bool = true;
 
     #[inline(always)]
     fn corners(self, table: F16, list: &[u8; 8]) -> F16 {
