@@ -1,7 +1,7 @@
 //! Where to part the refs of a large node: SAH over bins.
 
 use super::refs::PrimRef;
-use super::split::{Areas, Box4, Extent, centre, greater, lesser};
+use super::split::{Areas, Box4, centre, greater, lesser};
 
 /// Bins along each axis at most.
 const BINS: usize = 32;
@@ -20,8 +20,28 @@ pub(crate) struct Effort {
 impl Effort {
     pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true };
     pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false };
-    pub const BEST: Effort = Effort { bins: BINS, samples: 1 << 29, one_axis: false };
+    pub const BEST: Effort = Effort { bins: BINS, samples: ALL, one_axis: false };
+
+    /// The same for these refs: a sample says nothing of a few that are much larger than the others, such as the walls
+    /// of a building.
+    pub fn for_refs(self, refs: &[PrimRef], areas: Areas) -> Effort {
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for r in refs {
+            let area = f64::from(areas.of_finite(&r.bounds));
+            sum += area;
+            squares += area * area;
+        }
+        // 1 where all are alike, about `n / k` where `k` have most of the area.
+        let uneven = squares * refs.len() as f64 > UNEVEN * sum * sum;
+        if uneven && !self.one_axis { Effort { samples: ALL, ..self } } else { self }
+    }
 }
+
+/// As many samples as there are refs.
+const ALL: usize = 1 << 29;
+
+/// Above this the areas of refs are so uneven that none is left out.
+const UNEVEN: f64 = 64.0;
 
 /// How centres fall into bins.
 #[derive(Clone, Copy)]
@@ -52,11 +72,6 @@ impl Binning {
         });
         bits.map(|bin| bin as usize)
     }
-
-    /// The lower wall of a bin, in coordinates of centres.
-    fn wall(&self, bin: usize, axis: usize) -> f32 {
-        self.lower[axis] + bin as f32 / self.scale[axis]
-    }
 }
 
 /// The plane of least cost, between two bins of one axis.
@@ -65,8 +80,6 @@ pub(crate) struct Plane {
     axis: usize,
     /// Bins below this one are left.
     bin: usize,
-    /// The boxes of the sides, unless only a sample of the refs is in the bins.
-    bounds: Option<[Box4; 2]>,
 }
 
 impl Plane {
@@ -81,27 +94,6 @@ impl Plane {
             count += usize::from(left);
         }
         count
-    }
-
-    /// Where the refs of the two sides lie, after [`part`](Self::part) has put `left_count` of them to
-    /// the front.
-    pub fn sides(&self, refs: &[PrimRef], left_count: usize, centres: &Box4) -> [Extent; 2] {
-        let Some(bounds) = self.bounds else {
-            let (left, right) = refs.split_at(left_count);
-            return [Extent::around(left), Extent::around(right)];
-        };
-        // What the centres do not leave: the plane, and half of the bounds.
-        let (axis, wall) = (self.axis, self.binning.wall(self.bin, self.axis));
-        let mut centres = [*centres; 2];
-        centres[0].upper[axis] = lesser(wall, centres[0].upper[axis]);
-        centres[1].lower[axis] = greater(wall, centres[1].lower[axis]);
-        let side = |i: usize| {
-            let (c, b) = (&centres[i], &bounds[i]);
-            let lower = core::array::from_fn(|k| greater(0.5 * b.lower[k], c.lower[k]));
-            let upper = core::array::from_fn(|k| lesser(0.5 * b.upper[k], c.upper[k]));
-            Extent { bounds: bounds[i], centres: Box4 { lower, upper } }
-        };
-        [side(0), side(1)]
     }
 }
 
@@ -156,9 +148,7 @@ pub(crate) fn best_plane(
     if bin == 0 {
         return None;
     }
-    let (left, right) = axes[axis].bounds[..binning.bins].split_at(bin);
-    let bounds = all.then(|| [Box4::around(left), Box4::around(right)]);
-    Some(Plane { binning, axis, bin, bounds })
+    Some(Plane { binning, axis, bin })
 }
 
 impl Axis {

@@ -28,7 +28,8 @@ pub(crate) fn grow(
 ) -> Option<usize> {
     let extent = Extent::around(refs);
     let areas = Areas::new(&extent.bounds.aabb());
-    let splitter = Splitter { limits, areas };
+    let effort = limits.effort.for_refs(refs, areas);
+    let splitter = Splitter { limits: &Limits { effort, ..*limits }, areas };
     let root = Task {
         node: 0,
         pairs: 2,

@@ -122,11 +122,13 @@ impl Chosen<'_> {
         Some(())
     }
 
-    /// The lanes of the bundle that stands for `node`, left before right.
+    /// The lanes of the bundle that stands for `node`, left before right but leaves last: what is pushed last is taken
+    /// first, and any hit is found sooner in a leaf.
     fn lanes_of<const W: usize>(&self, node: u32, lanes: &mut [Lane; W]) -> Option<usize> {
         let mut stack = [(0u32, 0usize); W];
         stack[0] = (node, W);
         let (mut pending, mut count) = (1, 0);
+        let (mut leaves, mut leaf_count) = ([Lane::default(); W], 0);
         while pending > 0 {
             pending -= 1;
             let (at, slots) = stack[pending];
@@ -146,13 +148,18 @@ impl Chosen<'_> {
                     *stack.get_mut(pending + 1)? = (node_at.first, left);
                     pending += 2;
                 }
+                None if is_leaf => {
+                    *leaves.get_mut(leaf_count)? = Lane { node: at, is_leaf };
+                    leaf_count += 1;
+                }
                 None => {
                     *lanes.get_mut(count)? = Lane { node: at, is_leaf };
                     count += 1;
                 }
             }
         }
-        Some(count)
+        lanes.get_mut(count..count + leaf_count)?.copy_from_slice(leaves.get(..leaf_count)?);
+        Some(count + leaf_count)
     }
 
     /// What lies below a node that is a leaf.

@@ -22,13 +22,6 @@ impl Box4 {
         }
     }
 
-    /// The box around boxes.
-    pub fn around(boxes: &[Box4]) -> Box4 {
-        let mut all = Box4::EMPTY;
-        boxes.iter().for_each(|one| all.add(one));
-        all
-    }
-
     /// The axis along which it is widest.
     pub fn widest(&self) -> usize {
         let width = |k: usize| self.upper[k] - self.lower[k];
@@ -93,7 +86,7 @@ impl Areas {
     }
 }
 
-/// The box around the refs of a node, and one that their centres do not leave.
+/// The box around the refs of a node, and the box around their centres.
 #[derive(Clone, Copy)]
 pub(crate) struct Extent {
     pub bounds: Box4,

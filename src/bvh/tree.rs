@@ -192,18 +192,10 @@ impl Splitter<'_> {
                 sides: s.sides,
             })
         } else {
-            // The box of the centres is a guess; when all are in one bin of it, it is looked for.
-            let exact = |bins| best_plane(refs, &Extent::around(refs).centres, areas, effort, bins);
-            let plane =
-                best_plane(refs, &task.extent.centres, areas, effort, bins).or_else(|| exact(bins));
-            plane.and_then(|plane| {
+            // None when all centres are in one point.
+            best_plane(refs, &task.extent.centres, areas, effort, bins).and_then(|plane| {
                 let left_count = plane.part(refs);
-                let sides = || plane.sides(refs, left_count, &task.extent.centres);
-                lasts(left_count).then(|| Split {
-                    left_count,
-                    least: least(left_count),
-                    sides: sides(),
-                })
+                lasts(left_count).then(|| split_at(refs, left_count, least(left_count)))
             })
         };
         match sah {
