@@ -10,9 +10,9 @@ use crate::query::{
     Counts, Decide, Exact, Filter, Meets, Precision, PrimId, QueryOptions, Watch, Watertight,
     flat_number,
 };
-use crate::ray::{Hit, PreparedRay, Ray};
+use crate::ray::{Hit, Ray};
 use crate::surface::{self, Surface};
-use crate::trace::{self, AnyHit, ClosestHit};
+use crate::trace::{self, AnyHit, ClosestHit, LocateHit};
 
 /// What a block holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -284,24 +284,24 @@ impl<'m> Accel<'m> {
     /// The block keeps no way from a primitive's number to its place, so this follows the ray once
     /// more: it costs about as much as the intersect call did.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
-        let ray = ray.prepare(self.0.header.reach)?;
         let Hit { prim, geometry, instance, .. } = *hit;
         let id = PrimId { prim, geometry, instance };
         let number = flat_number(&id, self.0.geometries, self.0.header.prim_limit)?;
-        self.surface_of::<Exact>(&ray, number, hit.t)
-            .or_else(|| self.surface_of::<Watertight>(&ray, number, hit.t))
+        self.surface_of::<Exact>(ray, number, hit.t)
+            .or_else(|| self.surface_of::<Watertight>(ray, number, hit.t))
     }
 
     /// The surface at the hit with this flat number and `t` in one precision.
-    fn surface_of<D: Decide>(&self, ray: &PreparedRay, number: u32, t: f32) -> Option<Surface> {
-        let found = trace::locate::<D>(&self.0, ray, number, t)?;
+    fn surface_of<D: Decide>(&self, ray: &Ray, number: u32, t: f32) -> Option<Surface> {
+        let found = trace::ask(&self.0, ray, LocateHit::<D>::new(number, t, &self.0))?;
+        let line = ray.line();
         let (block, lane) = (found.place().block as usize, found.place().lane as usize);
         if number < self.0.header.triangle_limit {
             let corners = self.0.triangle_blocks.get(block)?.triangle(lane);
-            return Some(surface::of_triangle(ray, corners));
+            return Some(surface::of_triangle(&line, corners));
         }
         let (centre, radius) = self.0.sphere_blocks.get(block)?.sphere(lane);
-        Some(surface::of_sphere(ray, centre, radius, found.root()))
+        Some(surface::of_sphere(&line, centre, radius, found.root()))
     }
 
     fn leaves(&self) -> Leaves<'m> {

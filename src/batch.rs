@@ -3,7 +3,7 @@
 
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::{Block, Bundles};
-use crate::bvh::Walk;
+use crate::bvh::{Columns, Walk};
 use crate::prim::Leaves;
 use crate::query::Query;
 use crate::ray::{NarrowSlab, PreparedRay, Ray, Slab};
@@ -98,7 +98,8 @@ impl<Q: Question + Copy, A> AskAll<'_, '_, Q, A> {
     #[inline(always)]
     fn fly<S: Simd>(mut self, s: S) {
         let leaves = Leaves::of(self.block);
-        let mut walks = [const { Walk::<ROOM>::new(0.0) }; FLIGHTS];
+        let mut columns = [const { Columns::<ROOM>::UNWRITTEN }; FLIGHTS];
+        let mut walks = columns.each_mut().map(|columns| Walk::new(columns, 0.0));
         let mut flights = [const { Flight::<Q::Query>::NONE }; FLIGHTS];
         let mut next = 0;
         let mut aloft = 0;
@@ -131,12 +132,8 @@ impl<Q: Question + Copy, A> AskAll<'_, '_, Q, A> {
         {
             flight.number = *next;
             *next += 1;
-            let Some(ray) = given.prepare_with(s, self.block.header.reach) else {
-                *answer = (self.keep)(Q::nothing());
-                continue;
-            };
-            let Some(slab) = NarrowSlab::new(s, &ray) else {
-                *answer = (self.keep)(ask(self.block, given, self.question));
+            let Some((ray, slab)) = given.prepare_with(s, self.block.header.reach) else {
+                *answer = (self.keep)(alone(self.block, given, self.question));
                 continue;
             };
             let query = self.question.query(&ray);
@@ -163,7 +160,7 @@ impl<Q: Question + Copy, A> AskAll<'_, '_, Q, A> {
     }
 }
 
-/// A ray that had no room in flight.
+/// A ray at the ends of the floats, or one that had no room in flight.
 #[cold]
 #[inline(never)]
 fn alone<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {

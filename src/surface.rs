@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
+use crate::exact::Line;
 use crate::interval::{sphere, triangle};
 use crate::math::rounding::{UNIT, f32_above, f32_below};
 use crate::math::wide;
-use crate::ray::PreparedRay;
 
 /// The surface at a hit, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,9 +22,9 @@ pub struct Surface {
     pub back_origin: [f32; 3],
 }
 
-/// The surface of a triangle where the ray meets it.
-pub(crate) fn of_triangle(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Surface {
-    let [u, v] = triangle::weights(&ray.line(), corners);
+/// The surface of a triangle where the line meets it.
+pub(crate) fn of_triangle(line: &Line, corners: [[f32; 3]; 3]) -> Surface {
+    let [u, v] = triangle::weights(line, corners);
     let [a, b, c] = corners.map(wide);
     // Whatever the error of the weights, the point lies in the plane.
     let point = a + u * (b - a) + v * (c - a);
@@ -32,9 +32,9 @@ pub(crate) fn of_triangle(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Surface 
     at(point, size, triangle::normal(corners))
 }
 
-/// The surface of a sphere where the ray enters (`root` 0) or leaves it.
-pub(crate) fn of_sphere(ray: &PreparedRay, centre: [f32; 3], radius: f32, root: usize) -> Surface {
-    let normal = sphere::normal(&ray.line(), centre, radius, root);
+/// The surface of a sphere where the line enters (`root` 0) or leaves it.
+pub(crate) fn of_sphere(line: &Line, centre: [f32; 3], radius: f32, root: usize) -> Surface {
+    let normal = sphere::normal(line, centre, radius, root);
     let centre = wide(centre);
     let radius = f64::from(radius);
     at(centre + radius * normal, centre.abs().max_element() + radius, normal)

@@ -7,13 +7,15 @@ use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
 use crate::query::{Any, Closest, Decide, Filter, Locate, Meets, Query, Watch, geometry_of};
-use crate::ray::{Hit, NONE, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
+use crate::ray::{Hit, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
 /// What is asked of a ray.
 pub(crate) trait Question {
     type Query: Query;
     type Answer;
+    /// Whether it need not be fast, which saves its code for every backend.
+    const RARE: bool = false;
 
     fn query(self, ray: &PreparedRay) -> Self::Query;
 
@@ -62,6 +64,7 @@ impl<'m, D, W> AnyHit<'m, D, W> {
 impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D, W, MEMORY> {
     type Query = Closest<'m, D, W, MEMORY>;
     type Answer = Option<Hit>;
+    const RARE: bool = W::COUNTS;
 
     #[inline(always)]
     fn query(self, ray: &PreparedRay) -> Self::Query {
@@ -87,6 +90,7 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D
 impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
     type Query = Any<'m, D, W>;
     type Answer = bool;
+    const RARE: bool = W::COUNTS;
 
     #[inline(always)]
     fn query(self, ray: &PreparedRay) -> Self::Query {
@@ -103,12 +107,48 @@ impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
     }
 }
 
+/// The meeting with the primitive of a number at an answered `t`.
+#[derive(Clone, Copy)]
+pub(crate) struct LocateHit<'m, D> {
+    number: u32,
+    t: f32,
+    prim_ids: &'m [u32],
+    decide: PhantomData<D>,
+}
+
+impl<'m, D> LocateHit<'m, D> {
+    /// With this flat number and `t`.
+    pub fn new(number: u32, t: f32, block: &Block<'m>) -> Self {
+        LocateHit { number, t, prim_ids: block.prim_ids, decide: PhantomData }
+    }
+}
+
+impl<'m, D: Decide> Question for LocateHit<'m, D> {
+    type Query = Locate<'m, D>;
+    type Answer = Option<D::Met>;
+    // Hits of the watertight mode, which is tried second, are rarely looked up.
+    const RARE: bool = !D::ANY_BOXES;
+
+    #[inline(always)]
+    fn query(self, ray: &PreparedRay) -> Self::Query {
+        Locate::new(self.number, self.t, ray, self.prim_ids)
+    }
+
+    #[inline(always)]
+    fn answer(_: &Block, _: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
+        query.found
+    }
+
+    fn nothing() -> Self::Answer {
+        None
+    }
+}
+
 /// The answer to `question` for one ray.
 #[inline(always)]
 pub(crate) fn ask<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
     let ask = Ask { block, ray, question };
-    // What is counted need not be fast, which saves its code for every backend.
-    if <Q::Query as Query>::Watch::COUNTS { ask.run(Scalar) } else { simd::dispatch(ask) }
+    if Q::RARE { ask.run(Scalar) } else { simd::dispatch(ask) }
 }
 
 /// One ray, waiting for a backend.
@@ -123,41 +163,24 @@ impl<Q: Question> Kernel for Ask<'_, '_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q::Answer {
-        let Some(ray) = self.ray.prepare_with(s, self.block.header.reach) else {
-            return Q::nothing();
+        let Ask { block, ray, question } = self;
+        let Some((ray, slab)) = ray.prepare_with(s, block.header.reach) else {
+            return ask_odd(block, ray, question);
         };
-        let mut query = self.question.query(&ray);
-        let ended = trace(s, self.block, &ray, &mut query);
-        Q::answer(self.block, &ray, &mut query, ended)
+        let mut query = question.query(&ray);
+        let ended = trace(s, block, &ray, &slab, &mut query);
+        Q::answer(block, &ray, &mut query, ended)
     }
 }
 
-/// The meeting with the primitive of this flat number at this answered `t`.
-pub(crate) fn locate<D: Decide>(
-    block: &Block,
-    ray: &PreparedRay,
-    number: u32,
-    t: f32,
-) -> Option<D::Met> {
-    let find = Find { block, ray, query: Locate::<D>::new(number, t, ray, block.prim_ids) };
-    // Hits of the watertight mode, which is tried second, are rarely looked up.
-    if D::ANY_BOXES { simd::dispatch(find) } else { find.run(Scalar) }
-}
-
-struct Find<'a, 'm, D: Decide> {
-    block: &'a Block<'m>,
-    ray: &'a PreparedRay,
-    query: Locate<'m, D>,
-}
-
-impl<D: Decide> Kernel for Find<'_, '_, D> {
-    type Output = Option<D::Met>;
-
-    #[inline(always)]
-    fn run<S: Simd>(mut self, s: S) -> Option<D::Met> {
-        trace(s, self.block, self.ray, &mut self.query);
-        self.query.found
-    }
+/// For rays and scenes at the ends of the floats, with boxes in `f64`. They are so rare that portable code will do.
+#[cold]
+#[inline(never)]
+fn ask_odd<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
+    let Some(ray) = ray.prepare_odd(block.header.reach) else { return Q::nothing() };
+    let mut query = question.query(&ray);
+    let ended = trace(Scalar, block, &ray, &WideSlab::new(&ray), &mut query);
+    Q::answer(block, &ray, &mut query, ended)
 }
 
 /// The record of the meeting that won.
@@ -166,47 +189,32 @@ fn hit<D: Decide>(block: &Block, ray: &PreparedRay, best: &D::Met, watch: &mut i
     let number = best.place().prim(block.prim_ids);
     let (geometry, first) =
         geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
-    let [u, v] = D::weights(ray, best);
+    let [u, v] = D::weights(best);
     let t = D::t(ray, best, watch);
     Hit { t, u, v, prim: number - first, geometry, instance: NONE }
 }
 
 /// Offers `query` what the ray meets, by the one traversal of the structure at hand.
 #[inline(always)]
-fn trace<S: Simd, Q: Query>(s: S, block: &Block, ray: &PreparedRay, query: &mut Q) -> bool {
-    let leaves = Leaves::of(block);
-    if let (KIND_GRID, Some(head)) = (block.header.kind, block.grids.first()) {
-        let Block { words, runs, .. } = *block;
-        return grid::walk(s, &Cells { head, words, runs, leaves }, ray, query);
-    }
-    // Boxes in `f32` where the frame allows.
-    match NarrowSlab::new(s, ray) {
-        Some(slab) => boxes(s, block, &leaves, ray, &slab, query),
-        None => wide_boxes(block, &leaves, ray, query),
-    }
-}
-
-/// For rays and scenes at the ends of the floats. They are so rare that portable code will do.
-#[cold]
-#[inline(never)]
-fn wide_boxes<Q: Query>(block: &Block, leaves: &Leaves, ray: &PreparedRay, query: &mut Q) -> bool {
-    boxes(Scalar, block, leaves, ray, &WideSlab::new(ray), query)
-}
-
-#[inline(always)]
-fn boxes<S: Simd, Q: Query>(
+fn trace<S: Simd, Q: Query>(
     s: S,
     block: &Block,
-    leaves: &Leaves,
     ray: &PreparedRay,
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    match (block.header.kind, block.bundles) {
-        (KIND_BVH, Bundles::None) => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
-        (_, Bundles::Four(bundles)) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        (_, Bundles::Eight(bundles)) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        (_, Bundles::Sixteen(bundles)) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        (_, Bundles::None) => leaves.intersect_all(s, ray, slab, query),
+    let leaves = &Leaves::of(block);
+    match block.bundles {
+        Bundles::Sixteen(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
+        Bundles::Eight(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
+        Bundles::Four(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
+        Bundles::None => match (block.header.kind, block.grids.first()) {
+            (KIND_BVH, _) => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
+            (KIND_GRID, Some(head)) => {
+                let (Block { words, runs, .. }, leaves) = (*block, *leaves);
+                grid::walk(s, &Cells { head, words, runs, leaves }, ray, query)
+            }
+            _ => leaves.intersect_all(s, ray, slab, query),
+        },
     }
 }

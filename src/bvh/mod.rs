@@ -21,6 +21,7 @@ use crate::caller::Caller;
 
 pub(crate) use bins::Effort;
 pub(crate) use compact::{build, needs};
+pub(crate) use stack::Columns;
 pub(crate) use traverse::traverse;
 pub(crate) use validate::{bundles_are_sound, tree_is_sound};
 pub(crate) use wide::{Walk, traverse_wide};

@@ -5,27 +5,38 @@
 use core::mem::MaybeUninit;
 
 use crate::block::bundle::ChildRef;
-use crate::simd::{Lanes, Simd, Width};
+use crate::simd::{Simd, Width};
 
-/// Children to come back to, each with the `t` at which the ray enters it: two columns.
+/// Room for a [`Stack`].
+pub(crate) struct Columns<const ROOM: usize> {
+    near: [MaybeUninit<f32>; ROOM],
+    refs: [MaybeUninit<u32>; ROOM],
+}
+
+impl<const ROOM: usize> Columns<ROOM> {
+    pub const UNWRITTEN: Self = Columns {
+        near: [const { MaybeUninit::uninit() }; ROOM],
+        refs: [const { MaybeUninit::uninit() }; ROOM],
+    };
+}
+
+/// Children to come back to, each with the `t` at which the ray enters it.
 ///
 /// All `refs` below `count` are written, and all of `near` too unless children were
 /// [pushed without](Self::push_refs). A push writes as many lanes as a vector has and then counts those that matter,
-/// so that it takes no branch.
-pub(super) struct Stack<const ROOM: usize> {
-    near: [MaybeUninit<f32>; ROOM],
-    refs: [MaybeUninit<u32>; ROOM],
+/// so that it takes no branch. The columns are borrowed, so that what is left can stay in registers.
+pub(super) struct Stack<'m, const ROOM: usize> {
+    near: &'m mut [MaybeUninit<f32>; ROOM],
+    refs: &'m mut [MaybeUninit<u32>; ROOM],
     count: usize,
 }
 
-impl<const ROOM: usize> Stack<ROOM> {
+impl<'m, const ROOM: usize> Stack<'m, ROOM> {
+    /// Without children.
     #[inline(always)]
-    pub const fn new() -> Self {
-        Stack {
-            near: [const { MaybeUninit::uninit() }; ROOM],
-            refs: [const { MaybeUninit::uninit() }; ROOM],
-            count: 0,
-        }
+    pub fn new(columns: &'m mut Columns<ROOM>) -> Self {
+        let Columns { near, refs } = columns;
+        Stack { near, refs, count: 0 }
     }
 
     #[inline(always)]
@@ -41,22 +52,26 @@ impl<const ROOM: usize> Stack<ROOM> {
         ChildRef(self.reference(last))
     }
 
-    /// Pushes the children in the lanes of `mask`, in their order; false when there is no room.
+    /// Pushes the children in the lanes of `mask`, two at least, far ones first but for the nearest, which it returns;
+    /// `None` when there is no room.
     #[inline(always)]
-    fn push<S: Width<W>, const W: usize>(
+    pub fn push_but_nearest<S: Width<W>, const W: usize>(
         &mut self,
         s: S,
         mask: u32,
         near: S::V,
         refs: &[ChildRef; W],
-    ) -> bool {
-        let column = self.near.get_mut(self.count..).and_then(|near| near.first_chunk_mut::<W>());
-        let Some(column) = column else { return false };
-        near.compress(mask, column);
-        self.push_refs(s, mask, refs)
+    ) -> Option<ChildRef> {
+        let near_out = self.near.get_mut(self.count..)?.first_chunk_mut::<W>()?;
+        let refs_out = self.refs.get_mut(self.count..)?.first_chunk_mut::<W>()?;
+        let nearest = s.sort(mask, near, ChildRef::words(refs), near_out, refs_out);
+        // Its place is the last, where the next ones go.
+        self.count += mask.count_ones() as usize - 1;
+        Some(ChildRef(nearest))
     }
 
-    /// The same without a word on where they are entered: they must not be [culled](Self::cull).
+    /// Pushes the children in the lanes of `mask`, in their order, without a word on where they are entered: they must
+    /// not be [culled](Self::cull). False when there is no room.
     #[inline(always)]
     pub fn push_refs<S: Width<W>, const W: usize>(
         &mut self,
@@ -71,35 +86,11 @@ impl<const ROOM: usize> Stack<ROOM> {
         true
     }
 
-    /// Pushes the children in the lanes of `mask` but the nearest, or nearly so, which it returns; `None` when
-    /// there is no room.
-    #[inline(always)]
-    pub fn push_but_nearest<S: Width<W>, const W: usize>(
-        &mut self,
-        s: S,
-        mask: u32,
-        near: S::V,
-        refs: &[ChildRef; W],
-    ) -> Option<ChildRef> {
-        let first = self.count;
-        if !self.push(s, mask, near, refs) {
-            return None;
-        }
-        let (number, nearest) = s.nearest(mask, near, ChildRef::words(refs));
-        // Its place goes to the last one.
-        let last = self.count.checked_sub(1)?;
-        let place = (first + number).min(last);
-        self.near[place] = self.near[last];
-        self.refs[place] = self.refs[last];
-        self.count = last;
-        Some(ChildRef(nearest))
-    }
-
     /// Drops what the ray enters beyond `t_bound`.
     #[inline(always)]
     pub fn cull<S: Simd>(&mut self, s: S, t_bound: f32) {
         let (near, refs) = (&mut self.near[..self.count], &mut self.refs[..self.count]);
-        // SAFETY: entries below `count` were written by `push`, or moved down from such ones; queries that
+        // SAFETY: entries below `count` were written by a push, or moved down from such ones; queries that
         // push without `near` have a bound that does not move, and do not come here.
         self.count = unsafe { s.keep_up_to(near, refs, t_bound) };
     }

@@ -1,6 +1,6 @@
 //! The one way through bundles.
 
-use super::stack::Stack;
+use super::stack::{Columns, Stack};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
@@ -12,8 +12,8 @@ use crate::simd::{Simd, Width};
 /// A bundle's children that the ray enters go to the stack in one step and the nearest of them is taken
 /// back; with one child, the usual case near the leaves, the stack is not touched. The stack is
 /// culled once for each hit that was accepted, so taking from it tests nothing.
-pub(crate) struct Walk<const ROOM: usize> {
-    stack: Stack<ROOM>,
+pub(crate) struct Walk<'m, const ROOM: usize> {
+    stack: Stack<'m, ROOM>,
     at: ChildRef,
     t_bound: f32,
 }
@@ -21,11 +21,11 @@ pub(crate) struct Walk<const ROOM: usize> {
 /// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry.
 const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 2 * 16;
 
-impl<const ROOM: usize> Walk<ROOM> {
+impl<'m, const ROOM: usize> Walk<'m, ROOM> {
     /// At the root.
     #[inline(always)]
-    pub const fn new(t_bound: f32) -> Self {
-        Walk { stack: Stack::new(), at: ChildRef::ROOT, t_bound }
+    pub fn new(columns: &'m mut Columns<ROOM>, t_bound: f32) -> Self {
+        Walk { stack: Stack::new(columns), at: ChildRef::ROOT, t_bound }
     }
 
     /// Back to the root, for another ray.
@@ -113,7 +113,8 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     query: &mut Q,
 ) -> bool {
     let boxes = slab.wide::<S, W>(s);
-    let mut walk = Walk::<ENOUGH_ROOM>::new(query.t_bound());
+    let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
+    let mut walk = Walk::new(&mut columns, query.t_bound());
     loop {
         let t_bounds = Width::<W>::splat(s, walk.t_bound());
         while !walk.at().is_leaf() {

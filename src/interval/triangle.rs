@@ -11,6 +11,8 @@ use crate::math::{sum_abs, wide};
 pub(crate) struct TriangleMeeting {
     pub t: f64,
     pub t_error: f64,
+    /// The weights of the second and the third vertex, not yet between 0 and 1.
+    pub weights: [f64; 2],
     pub front: bool,
     /// Whether it took real arithmetic to know.
     pub exact: bool,
@@ -114,12 +116,43 @@ fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Feature> {
     })
 }
 
-/// The weights of the second and the third vertex where the line meets the triangle, by one sequence
-/// of operations whatever decided that it does; 0 when they cannot be told.
+/// A triangle as its first vertex and what is computed from it.
+struct Spanned {
+    /// From the line's origin to the first vertex.
+    to_plane: DVec3,
+    e1: DVec3,
+    e2: DVec3,
+    n: DVec3,
+    d: DVec3,
+    /// The line's direction along the normal.
+    along: f64,
+}
+
+impl Spanned {
+    #[inline(always)]
+    fn new(line: &Line, triangle: [[f32; 3]; 3]) -> Self {
+        let [a, b, c] = triangle.map(wide);
+        let d = wide(line.direction);
+        let (e1, e2) = (b - a, c - a);
+        let n = e1.cross(e2);
+        Spanned { to_plane: a - wide(line.origin), e1, e2, n, d, along: d.dot(n) }
+    }
+
+    /// The weights of the second and the third vertex where the line meets the plane; 0 when they cannot be told.
+    ///
+    /// Source: \[MT97\].
+    #[inline(always)]
+    fn weights(&self) -> [f64; 2] {
+        let aside = self.to_plane.cross(self.d);
+        let [u, v] = [self.e2.dot(aside), -self.e1.dot(aside)];
+        if self.along == 0.0 { [0.0; 2] } else { [u / self.along, v / self.along] }
+    }
+}
+
+/// The weights of the second and the third vertex where the line meets the triangle, by the same operations
+/// whatever decided that it does; 0 when they cannot be told.
 pub(crate) fn weights(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 2] {
-    let [u, v, w] = volumes(line, triangle);
-    let sum = u + v + w;
-    if sum == 0.0 { [0.0; 2] } else { [u / sum, v / sum] }
+    Spanned::new(line, triangle).weights()
 }
 
 /// The meeting of the line with the triangle's plane: all that is left to ask for a line that surely
@@ -131,24 +164,20 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
 /// The same, or `None` where the plane is nearly parallel to the line.
 #[inline(always)]
 pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    let [a, b, c] = triangle.map(wide);
-    let d = wide(line.direction);
-    let (e1, e2) = (b - a, c - a);
-    let n = e1.cross(e2);
-    let to_plane = a - wide(line.origin);
-    let along = d.dot(n);
+    let spanned = Spanned::new(line, triangle);
+    let Spanned { to_plane, e1, e2, n, d, along } = spanned;
     // Four roundings in `n`, one in `to_plane`, three in either dot product.
     let size = gamma(8) * sum_abs(e1) * sum_abs(e2);
     let along_error = sum_abs(d) * size;
     if !(1024.0 * along_error < along.abs()) {
         return None;
     }
-    let inverse = 1.0 / along;
-    let t = to_plane.dot(n) * inverse;
-    let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) * inverse.abs();
-    // A hundredth for the divisor's own error, and the roundings of inverse and quotient.
+    let t = to_plane.dot(n) / along;
+    let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
+    // A hundredth for the divisor's own error, and the roundings of the quotient.
     let t_error = 1.01 * t_error + 3.0 * UNIT * t.abs();
-    Some(TriangleMeeting { t, t_error, front: along < 0.0, exact: false, feature: Feature::Face })
+    let (weights, front) = (spanned.weights(), along < 0.0);
+    Some(TriangleMeeting { t, t_error, weights, front, exact: false, feature: Feature::Face })
 }
 
 /// The meeting with the plane, without error.
@@ -157,7 +186,8 @@ fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> 
     let (t, t_error) = distance.approximate();
     // None of the volumes is of the other sign.
     let front = exact::volumes(line, triangle).iter().any(|v| *v < 0.0);
-    Some(TriangleMeeting { t, t_error, front, exact: true, feature: Feature::Face })
+    let weights = weights(line, triangle);
+    Some(TriangleMeeting { t, t_error, weights, front, exact: true, feature: Feature::Face })
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.

@@ -17,7 +17,7 @@ use crate::block::leaf::{
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Triangles};
-use crate::simd::Simd;
+use crate::simd::{Kernel, Simd};
 
 /// The leaf blocks of one accel.
 #[derive(Clone, Copy)]
@@ -144,12 +144,21 @@ impl Leaves<'_> {
         if found.candidates == 0 {
             return false;
         }
-        // Many in doubt: the block is small for the precision of the sieve, and of the boxes above it.
-        let in_doubt = (found.candidates & !found.sure).count_ones();
-        if Q::ANY_BOXES && in_doubt > 2 && !is_near(ray, block, t_bound) {
-            return false;
+        let number = number as u32;
+        // Neither `t` nor order matters to those that want any hit.
+        let inside = if Q::ORDERED { 0 } else { found.inside(s, ray) };
+        let lanes = if inside == 0 { found.candidates } else { inside };
+        if lanes.is_power_of_two() || inside != 0 {
+            let lane = lanes.trailing_zeros();
+            let certain = Certain { sure: found.sure >> lane & 1 == 1, inside: inside != 0 };
+            if consider(block, number, lane, certain, ray, query) {
+                return true;
+            }
+            if found.candidates.is_power_of_two() {
+                return false;
+            }
         }
-        consider(block, number, &found, ray, query)
+        s.run(Several { block, number, t_bound, found: found.stored(), ray, query })
     }
 
     #[inline(never)]
@@ -165,53 +174,83 @@ impl Leaves<'_> {
         Lanes(lanes).any(|lane| {
             let (centre, radius) = block.sphere(lane);
             sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
-                let place = place(number, block.first, lane);
+                let place = place(number as u32, block.first, lane as u32);
                 query.sphere(ray, &SphereLane { centre, radius, place, detail })
             })
         })
     }
 }
 
-/// Offers `query` the candidates of a block, near ones first; true when it wants no more.
+/// What the sieve left of a block, several lanes, near ones first.
 ///
-/// Out of line, and so the same code for every backend, layout and structure: what is left here is for
-/// scalar numbers.
+/// Out of line: what all rays of a loop would share for it, in registers and on the stack, few of them use.
+struct Several<'a, Q> {
+    block: &'a TriangleBlock,
+    number: u32,
+    t_bound: f32,
+    found: Triangles<[f32; 16]>,
+    ray: &'a PreparedRay,
+    query: &'a mut Q,
+}
+
+impl<Q: Query> Kernel for Several<'_, Q> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> bool {
+        let Several { block, number, t_bound, found, ray, query } = self;
+        let found = found.loaded(s);
+        let Triangles { candidates, sure, .. } = found;
+        // Many in doubt: the block is small for the precision of the sieve, and of the boxes above it.
+        let in_doubt = (candidates & !sure).count_ones();
+        if Q::ANY_BOXES && in_doubt > 2 && !is_near(ray, block, t_bound) {
+            return false;
+        }
+        let mut rest = candidates;
+        while rest != 0 {
+            let lane = found.nearest(s, rest);
+            rest &= !(1 << lane);
+            let certain = Certain { sure: sure >> lane & 1 == 1, inside: false };
+            if consider(block, number, lane, certain, ray, query) {
+                return true;
+            }
+            // What was found in a lane may be nearer than others.
+            if rest != 0 && query.t_bound() < t_bound {
+                rest &= found.up_to(s, ray, query.t_bound());
+            }
+        }
+        false
+    }
+}
+
+/// What the sieve knows of a lane that it did not reject.
+#[derive(Clone, Copy)]
+struct Certain {
+    sure: bool,
+    inside: bool,
+}
+
+/// Offers `query` a lane; true when it wants no more.
+///
+/// Out of line, and so the same code for every backend, layout and structure: what is left is for scalar numbers. All
+/// arguments fit into registers: what is written to memory by parts is slow to read as a whole.
 #[inline(never)]
 fn consider<Q: Query>(
     block: &TriangleBlock,
-    number: usize,
-    found: &Triangles,
+    number: u32,
+    lane: u32,
+    Certain { sure, inside }: Certain,
     ray: &PreparedRay,
     query: &mut Q,
 ) -> bool {
-    let lane = |lane: u32| TriangleLane {
-        block,
-        place: place(number, block.first, lane as usize),
-        sure: found.sure >> lane & 1 == 1,
-        inside: found.inside >> lane & 1 == 1,
-    };
-    if found.candidates.is_power_of_two() {
-        return query.triangle(ray, &lane(found.candidates.trailing_zeros()));
-    }
-    let t_bound = query.t_bound();
-    let mut rest = found.candidates;
-    while let Some(next) = found.nearest(rest) {
-        rest &= !(1 << next);
-        if query.triangle(ray, &lane(next)) {
-            return true;
-        }
-        // What was found in a lane may be nearer than others.
-        if query.t_bound() < t_bound {
-            rest &= found.up_to(ray, query.t_bound());
-        }
-    }
-    false
+    let place = place(number, block.first, lane);
+    query.triangle(ray, &TriangleLane { block, place, sure, inside })
 }
 
 /// The place of a lane of the block with this number and first entry.
 #[inline(always)]
-fn place(number: usize, first: u32, lane: usize) -> Place {
-    Place { block: number as u32, lane: lane as u32, entry: first.wrapping_add(lane as u32) }
+fn place(block: u32, first: u32, lane: u32) -> Place {
+    Place { block, lane, entry: first.wrapping_add(lane) }
 }
 
 /// Whether the ray comes near a block, in `f64`.

@@ -59,6 +59,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
 
     #[inline(always)]
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        self.filter.fetch(lane.place);
         // What was offered once is not computed again.
         let known = match &self.best {
             Some(best) => {

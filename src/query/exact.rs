@@ -19,6 +19,8 @@ pub(crate) struct ExactMet {
     t: f64,
     /// A bound on the error of `t`.
     t_error: f64,
+    /// Of the second and the third vertex of a triangle.
+    weights: [f32; 2],
     /// What is met, from which the real `t` follows.
     meeting: Meeting,
     /// Where on a triangle.
@@ -173,6 +175,7 @@ impl Decide for Exact {
         let met = ExactMet {
             t: meeting.t,
             t_error: meeting.t_error,
+            weights: [meeting.weights[0] as f32, meeting.weights[1] as f32],
             meeting: Meeting::Triangle(lane.corners()),
             feature: meeting.feature,
             place: lane.place,
@@ -198,6 +201,7 @@ impl Decide for Exact {
             let met = ExactMet {
                 t: both.t[root],
                 t_error: both.t_error[root],
+                weights: [0.0; 2],
                 meeting: Meeting::Sphere { centre, radius, root },
                 feature: Feature::Face,
                 place: lane.place,
@@ -240,7 +244,7 @@ impl Decide for Exact {
 
     #[inline(always)]
     fn t_bound(ray: &PreparedRay, met: &ExactMet) -> f32 {
-        ray.t_above(met.interval().far)
+        ray.t_above(met.t, 1.01 * met.t_error)
     }
 
     #[inline(always)]
@@ -258,13 +262,8 @@ impl Decide for Exact {
     }
 
     #[inline(always)]
-    fn weights(ray: &PreparedRay, met: &ExactMet) -> [f32; 2] {
-        match met.meeting {
-            Meeting::Triangle(corners) => {
-                clamped_weights(triangle::weights(&ray.line(), corners).map(|x| x as f32))
-            }
-            Meeting::Sphere { .. } => [0.0; 2],
-        }
+    fn weights(met: &ExactMet) -> [f32; 2] {
+        clamped_weights(met.weights)
     }
 }
 

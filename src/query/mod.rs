@@ -179,7 +179,7 @@ pub(crate) trait Decide {
     fn t(ray: &PreparedRay, met: &Self::Met, watch: &mut impl Watch) -> f32;
 
     /// The weights of the second and the third vertex.
-    fn weights(ray: &PreparedRay, met: &Self::Met) -> [f32; 2];
+    fn weights(met: &Self::Met) -> [f32; 2];
 }
 
 /// What every meeting knows of itself.

@@ -3,6 +3,7 @@
 use crate::block::Geometry;
 use crate::block::leaf::Place;
 use crate::ray::NONE;
+use crate::simd::prefetch;
 
 /// Which of two sides of a surface a ray may meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -105,6 +106,14 @@ impl<'m> Filter<'m> {
         !(skippable && prim == self.skip) && (self.mask == 0 || self.mask_sees(prim))
     }
 
+    /// Has the number of the primitive stored there fetched: it is far away, and asked for last.
+    #[inline(always)]
+    pub fn fetch(&self, place: Place) {
+        if let Some(number) = self.prim_ids.get(place.entry as usize) {
+            prefetch(number);
+        }
+    }
+
     /// Whether meetings with either side count.
     #[inline(always)]
     pub fn both_sides(&self) -> bool {
@@ -130,6 +139,10 @@ impl<'m> Filter<'m> {
 /// The number of the geometry that holds the flat number `prim`, and the geometry.
 #[inline]
 pub(crate) fn geometry_of(prim: u32, geometries: &[Geometry]) -> Option<(u32, &Geometry)> {
+    // Mostly there is one.
+    if let [only] = geometries {
+        return (only.first <= prim).then_some((0, only));
+    }
     // Empty geometries share their first number with the next one; the last of them holds it.
     let after = geometries.partition_point(|g| g.first <= prim);
     let number = after.checked_sub(1)?;

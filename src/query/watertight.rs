@@ -112,7 +112,7 @@ impl Decide for Watertight {
         limit(t, ray.given.t_min, ray.given.t_max) + 0.0
     }
 
-    fn weights(_: &PreparedRay, met: &WatertightMet) -> [f32; 2] {
+    fn weights(met: &WatertightMet) -> [f32; 2] {
         clamped_weights(met.weights)
     }
 }

@@ -33,6 +33,11 @@ fn ray(random: &mut Random) -> Option<(PreparedRay, f32)> {
     Some((ray, reach))
 }
 
+/// The ray for boxes in `f32`, if it is an ordinary one.
+fn narrow(ray: &PreparedRay, reach: f32) -> Option<NarrowSlab> {
+    ray.given.prepare_with(Scalar, reach).map(|(_, slab)| slab)
+}
+
 /// A wall within reach, of any exponent.
 fn wall(random: &mut Random, reach: f32) -> f32 {
     let part = random.unit() as f32 * 2f32.powi(-(random.below(30) as i32));
@@ -41,7 +46,7 @@ fn wall(random: &mut Random, reach: f32) -> f32 {
 
 /// The distances to walls, against an `f64` computation.
 fn see_walls(random: &mut Random, ray: &PreparedRay, reach: f32, worst: &mut Worst) -> bool {
-    let Some(slab) = NarrowSlab::new(Scalar, ray) else { return true };
+    let Some(slab) = narrow(ray, reach) else { return true };
     let k = random.below(3);
     let d = f64::from(ray.given.direction[k]);
     if d == 0.0 {
@@ -50,7 +55,7 @@ fn see_walls(random: &mut Random, ray: &PreparedRay, reach: f32, worst: &mut Wor
     let wall = wall(random, reach);
     let real = (f64::from(wall) - f64::from(ray.given.origin[k])) / d * ray.t_scale;
     // Where there can be no hit, the distance only has to stay on its side.
-    if real.abs() > 2.0 * f64::from(ray.reach) {
+    if real.abs() > 2.0 * f64::from(reach * ray.scale) {
         return true;
     }
     let product = wall * slab.reciprocal[k];
@@ -91,7 +96,7 @@ fn boxes_hold(random: &mut Random, ray: &PreparedRay, reach: f32) -> bool {
             f64::from(part.near) <= t && t <= f64::from(part.far)
         })
     };
-    let narrow = NarrowSlab::new(Scalar, ray);
+    let narrow = narrow(ray, reach);
     holds(&|bound| WideSlab::new(ray).part(&aabb, bound))
         && narrow.is_none_or(|slab| holds(&|bound| slab.part(&aabb, bound)))
 }

@@ -1,10 +1,13 @@
 //! A ray in a frame of its own, in which `f32` neither over- nor underflows.
 
 use super::Ray;
+use super::slab::{NarrowSlab, Scales};
 use crate::exact::Line;
 use crate::math::float::{narrow_power_of_two, power_of_two};
-use crate::math::rounding::{f32_above, f32_below};
-use crate::simd::{Lanes, Scalar, Width};
+use crate::math::rounding::{UNIT32, f32_above, f32_below};
+#[cfg(test)]
+use crate::simd::Scalar;
+use crate::simd::{Lanes, Simd, Width};
 
 /// A ray that can hit something, with what every box and primitive test needs of it.
 ///
@@ -19,23 +22,15 @@ pub(crate) struct PreparedRay {
     pub given: Ray,
     /// From given coordinates to the frame's: a power of two between 2^-126 and 2^126.
     pub scale: f32,
-    /// The frame's exponent: scene and origin lie below 2^exponent, unless that is above 126.
-    pub exponent: i32,
-    /// The fourth lane of these three means nothing: four are one vector on most machines.
+    /// The fourth lane of these two means nothing: four are one vector on most machines.
     pub origin: [f32; 4],
     pub direction: [f32; 4],
-    /// The reciprocals of the sizes of its components, of slow ones that of [`SLOWEST`].
-    pub inverse: [f32; 4],
-    /// A bound on every coordinate of scene and origin in the frame.
-    pub reach: f32,
     /// From given `t` to the frame's, a power of two.
     pub t_scale: f64,
     /// Below all `t` of interest, in the frame.
     pub t_min: f32,
     /// Above all `t` of interest, in the frame: the given limit, or the largest float.
     pub t_max: f32,
-    /// Within all `t` of interest: the limits rounded inwards.
-    pub t_inside: [f32; 2],
     pub shear: Shear,
 }
 
@@ -47,73 +42,180 @@ pub(crate) struct Shear {
     pub axes: [usize; 3],
     /// The direction's x and y for each unit of depth: at most 1 in size, but for rounding.
     pub slope: [f32; 2],
-    /// The greater size of the two.
-    pub steepness: f32,
-    /// 1 or -1: depth grows along the ray.
-    pub depth_sign: f32,
-    /// Depth for each unit of `t` in the frame, between 1 and 2.
+    /// What x and y of a sheared vertex may be off for each unit of depth, whatever they are.
+    pub blur: f32,
+    /// From given coordinates along that axis to depths, which grow along the ray: the frame's scale or minus that.
+    pub depth_scale: f32,
+    /// The depth of the ray's origin.
+    pub origin_depth: f32,
+    /// Depth from there for each unit of `t` in the frame, between 1 and 2.
     pub depth_rate: f32,
+    /// Below the depth of all `t` of interest, from the origin.
+    pub low: f32,
 }
 
-/// A component below this, against one of at least 1, moves the ray by less than what boxes are padded by:
-/// it counts as this much, so that its reciprocal is finite.
+/// What depths that are computed from limits are widened by, for one rounding and for what the scaling of vertices took
+/// below the frame's least float.
+#[inline(always)]
+fn depth_slack(depth: f32) -> f32 {
+    // Infinite depths stay as they are.
+    depth.abs().min(f32::MAX) * (4.0 * UNIT32) + 1.0 / (1u128 << 100) as f32
+}
+
+impl Shear {
+    /// Above the depth of all `t` up to `t_bound`, from the origin.
+    #[inline(always)]
+    pub fn high(&self, t_bound: f32) -> f32 {
+        let depth = t_bound * self.depth_rate;
+        depth + depth_slack(depth)
+    }
+}
+
+/// A component below this part of the largest moves the ray by less than what boxes are padded by: it counts
+/// as this much, so that its reciprocal is finite.
 const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
+
+/// Ordinary scenes, origins and directions are smaller than this, and not all smaller than its reciprocal.
+const ORDINARY: f32 = (1u64 << 60) as f32;
+
+const EXPONENT: u32 = f32::INFINITY.to_bits();
+
+/// `2^n` by the bits of a float: its exponent.
+#[inline(always)]
+fn exponent_bits(x: f32) -> u32 {
+    x.to_bits() & EXPONENT
+}
 
 /// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
 /// infinities and NaN above the others.
-#[inline(always)]
 fn largest_bits(v: [f32; 3]) -> u32 {
     let [x, y, z] = v.map(|x| x.to_bits() & !(1 << 31));
     x.max(y).max(z)
 }
 
 /// The exponent `e` with `|x| < 2^e` by the bits of `|x|`, at least -126; 129 for infinity.
-#[inline(always)]
 fn exponent_above(bits: u32) -> i32 {
     (bits >> 23) as i32 - 126
 }
 
-/// The floats around `t * scale`, the scale a power of two: not above it, and not below. Mostly both are the
-/// product.
+/// `t * scale`, the scale a power of two, unless it is neither zero nor a normal float, but also when it is infinite.
 #[inline(always)]
-fn floats_around(t: f32, scale: f64) -> [f32; 2] {
-    if t == f32::MAX && scale > 1.0 {
-        // The limit of most rays.
-        return [f32::MAX, f32::INFINITY];
+fn scaled(t: f32, scale: f32) -> Option<f32> {
+    let product = t * scale;
+    (product.abs() >= f32::MIN_POSITIVE || t == 0.0).then_some(product)
+}
+
+/// The largest float that is not above `t * scale`.
+#[inline(always)]
+fn below(t: f32, scale: f32) -> f32 {
+    match scaled(t, scale) {
+        Some(product) if product > f32::MAX => f32::MAX,
+        Some(product) => product,
+        None => rarely(f32_below, t, scale),
     }
-    // With a scale that is no normal `f32` this is an infinity, a NaN, or too small.
-    let product = t * scale as f32;
-    if product.is_normal() {
-        [product; 2]
-    } else if t == 0.0 {
-        [t; 2]
-    } else {
-        rounded_around(f64::from(t) * scale)
+}
+
+/// The smallest float that is not below `t * scale`.
+#[inline(always)]
+fn above(t: f32, scale: f32) -> f32 {
+    match scaled(t, scale) {
+        Some(product) if product < -f32::MAX => -f32::MAX,
+        Some(product) => product,
+        None => rarely(f32_above, t, scale),
     }
 }
 
 #[cold]
 #[inline(never)]
-fn rounded_around(x: f64) -> [f32; 2] {
-    [f32_below(x), f32_above(x)]
+fn rarely(round: fn(f64) -> f32, t: f32, scale: f32) -> f32 {
+    round(f64::from(t) * f64::from(scale))
 }
 
-const INFINITY_BITS: u32 = f32::INFINITY.to_bits();
-
 impl Ray {
-    /// What traversal needs, or `None` for a ray that hits nothing by definition. `reach` is the
-    /// largest coordinate of the scene, infinite if it is not representable.
-    pub(crate) fn prepare(&self, reach: f32) -> Option<PreparedRay> {
-        self.prepare_with(Scalar, reach)
+    /// The line on which it lies.
+    #[inline(always)]
+    pub(crate) fn line(&self) -> Line {
+        Line { origin: self.origin, direction: self.direction }
     }
 
-    /// The same, by the instructions of a backend.
+    /// The limits, with the largest floats for what is beyond.
     #[inline(always)]
-    pub(crate) fn prepare_with<S: Width<4>>(&self, s: S, reach: f32) -> Option<PreparedRay> {
-        let (farthest, longest) = (largest_bits(self.origin), largest_bits(self.direction));
+    fn finite_limits(&self) -> [f32; 2] {
         let t_min = if self.t_min < -f32::MAX { -f32::MAX } else { self.t_min };
         let t_max = if self.t_max > f32::MAX { f32::MAX } else { self.t_max };
-        let finite = farthest < INFINITY_BITS && longest < INFINITY_BITS;
+        [t_min, t_max]
+    }
+
+    /// What traversal needs of an ordinary ray, and the same for boxes. `None` for a ray that hits nothing by
+    /// definition, and for those at the ends of the floats. `reach` is the largest coordinate of the scene,
+    /// infinite if it is not representable.
+    ///
+    /// What all rays wait for is the way from the largest component over the reciprocals to the first boxes; so
+    /// division does not wait for the frame, and both meet behind it.
+    #[inline(always)]
+    pub(crate) fn prepare_with<S: Simd>(
+        &self,
+        s: S,
+        reach: f32,
+    ) -> Option<(PreparedRay, NarrowSlab)> {
+        let splat = |x: f32| Width::<4>::splat(s, x);
+        let [from, along] = self.rows();
+        let (o, d) = (Width::<4>::load(s, &from), Width::<4>::load(s, &along));
+        let (distance, speed) = (o.abs(), d.abs());
+        let fastest = s.largest_of_three(speed);
+        let inverse = splat(1.0).div(speed.max(fastest.mul(splat(SLOWEST))));
+        let depth = 31 - (fastest.less_or_equal(speed) & 7 | 1).leading_zeros();
+        let [fastest, ..] = array::<S>(fastest);
+        let [farthest, ..] = array::<S>(s.largest_of_three(distance));
+        let reach = if farthest > reach { farthest } else { reach };
+        let [t_min, t_max] = self.finite_limits();
+        // These comparisons refuse a NaN, which may have been lost above.
+        let within = splat(ORDINARY);
+        let finite = distance.less(within) & speed.less(within) & 7 == 7 && t_min <= t_max;
+        let ordinary = |x: f32| (1.0 / ORDINARY..ORDINARY).contains(&x);
+        if !(finite && ordinary(fastest) && ordinary(reach)) {
+            return None;
+        }
+        // 2^e above all coordinates and 2^l below the fastest component: by exponents, whose zero is 127.
+        let (e, l) = (exponent_bits(reach), exponent_bits(fastest));
+        let scale = f32::from_bits((253 << 23) - e);
+        let t_scale = f32::from_bits((126 << 23) + l - e);
+        let direction = d.mul(splat(f32::from_bits((254 << 23) - l)));
+        let (t_min_below, t_max_above) = (below(t_min, t_scale), above(t_max, t_scale));
+        let scales = Scales { t: t_scale, space: scale };
+        let backwards = self.direction.map(f32::is_sign_negative);
+        let slab = NarrowSlab::new(s, [o, d, inverse], scales, reach, t_min_below, backwards);
+        let (origin, direction) = (array::<S>(o.mul(splat(scale))), array::<S>(direction));
+        let depth = depth as usize % 3;
+        let ray = PreparedRay {
+            given: Ray { t_min, t_max, ..*self },
+            scale,
+            origin,
+            direction,
+            t_scale: f64::from(t_scale),
+            t_min: t_min_below,
+            t_max: t_max_above,
+            shear: Shear::new(depth, &origin, &direction, scale, t_min_below),
+        };
+        Some((ray, slab))
+    }
+
+    /// The same without boxes, of any ray that can hit something.
+    #[cfg(test)]
+    pub(crate) fn prepare(&self, reach: f32) -> Option<PreparedRay> {
+        match self.prepare_with(Scalar, reach) {
+            Some((ray, _)) => Some(ray),
+            None => self.prepare_odd(reach),
+        }
+    }
+
+    /// What traversal needs of any ray, or `None` for one that hits nothing by definition.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn prepare_odd(&self, reach: f32) -> Option<PreparedRay> {
+        let (farthest, longest) = (largest_bits(self.origin), largest_bits(self.direction));
+        let [t_min, t_max] = self.finite_limits();
+        let finite = farthest < EXPONENT && longest < EXPONENT;
         if !(finite && longest > 0 && t_min <= t_max) {
             return None;
         }
@@ -122,39 +224,38 @@ impl Ray {
         let scale = narrow_power_of_two(-exponent);
         // Subnormal components have no exponent of their own: a first step brings them up.
         let lift = if longest < f32::MIN_POSITIVE.to_bits() { 24 } else { 0 };
-        let lifted = narrow_power_of_two(lift);
-        let length = exponent_above((f32::from_bits(longest) * lifted).to_bits()) - 1;
-        let [x, y, z] = self.direction;
-        let given = s.load(&[x, y, z, 0.0]).mul(s.splat(lifted));
-        let direction = given.mul(s.splat(narrow_power_of_two(-length)));
-        let [x, y, z] = self.origin;
-        let origin = s.load(&[x, y, z, 0.0]).mul(s.splat(scale));
-        let inverse = s.splat(1.0).div(direction.abs().max(s.splat(SLOWEST)));
+        let lifted = self.direction.map(|x| x * narrow_power_of_two(lift));
+        let length = exponent_above(largest_bits(lifted)) - 1;
+        let [x, y, z] = lifted.map(|x| x * narrow_power_of_two(-length));
+        let direction = [x, y, z, 0.0];
+        let [x, y, z] = self.origin.map(|x| x * scale);
+        let origin = [x, y, z, 0.0];
         let t_scale = power_of_two(length - lift - exponent);
-        let [t_min_below, t_min_above] = floats_around(t_min, t_scale);
-        let [t_max_below, t_max_above] = floats_around(t_max, t_scale);
-        let reach = f32::from_bits(reach) * scale;
-        let array = |v: S::V| {
-            let mut lanes = [0.0; 4];
-            v.store(&mut lanes);
-            lanes
-        };
-        let (direction, inverse) = (array(direction), array(inverse));
+        let t_min_below = f32_below(f64::from(t_min) * t_scale);
         Some(PreparedRay {
             given: Ray { t_min, t_max, ..*self },
             scale,
-            exponent,
-            origin: array(origin),
+            origin,
             direction,
-            inverse,
-            reach: if reach > 4.0 { 4.0 } else { reach },
             t_scale,
             t_min: t_min_below,
-            t_max: t_max_above,
-            t_inside: [t_min_above, t_max_below],
-            shear: Shear::new(&direction, &inverse),
+            t_max: f32_above(f64::from(t_max) * t_scale),
+            shear: Shear::new(depth_axis(direction), &origin, &direction, scale, t_min_below),
         })
     }
+}
+
+/// The axis of the largest component, the last of equal ones.
+fn depth_axis([x, y, z, _]: [f32; 4]) -> usize {
+    let [x, y, z] = [x, y, z].map(f32::abs);
+    if z >= x && z >= y { 2 } else { usize::from(y >= x) }
+}
+/// The lanes of a vector.
+#[inline(always)]
+fn array<S: Simd>(v: <S as Width<4>>::V) -> [f32; 4] {
+    let mut lanes = [0.0; 4];
+    v.store(&mut lanes);
+    lanes
 }
 
 /// The axes x, y and depth, for each depth.
@@ -162,19 +263,23 @@ const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
 
 impl Shear {
     #[inline(always)]
-    fn new(direction: &[f32; 4], inverse: &[f32; 4]) -> Self {
-        let [x, y, z, _] = direction.map(|x| x.to_bits() & !(1 << 31));
-        let depth = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
+    fn new(depth: usize, origin: &[f32; 4], direction: &[f32; 4], scale: f32, t_min: f32) -> Self {
         let axes = const { &AXES }[depth];
-        let slope = [axes[0], axes[1]].map(|axis| direction[axis] * inverse[depth]);
         let depth_rate = direction[depth].abs();
-        let [a, b] = slope.map(f32::abs);
+        let inverse = 1.0 / depth_rate;
+        let slope = [direction[axes[0]] * inverse, direction[axes[1]] * inverse];
+        let [a, b] = [slope[0].abs(), slope[1].abs()];
+        let sign = direction[depth].to_bits() & 1 << 31;
+        let signed = |x: f32| f32::from_bits(x.to_bits() ^ sign);
+        let low = t_min * depth_rate;
         Shear {
             axes,
             slope,
-            steepness: if a > b { a } else { b },
-            depth_sign: 1f32.copysign(direction[depth]),
+            blur: 5.5 * UNIT32 * if a > b { a } else { b },
+            depth_scale: signed(scale),
+            origin_depth: signed(origin[depth]),
             depth_rate,
+            low: low - depth_slack(low),
         }
     }
 }
@@ -184,34 +289,54 @@ impl PreparedRay {
     pub const BLANK: Self = PreparedRay {
         given: Ray::new([0.0; 3], [0.0; 3]),
         scale: 0.0,
-        exponent: 0,
         origin: [0.0; 4],
         direction: [0.0; 4],
-        inverse: [0.0; 4],
-        reach: 0.0,
         t_scale: 0.0,
         t_min: 0.0,
         t_max: 0.0,
-        t_inside: [0.0; 2],
         shear: Shear {
             axes: AXES[2],
             slope: [0.0; 2],
-            steepness: 0.0,
-            depth_sign: 0.0,
+            blur: 0.0,
+            depth_scale: 0.0,
+            origin_depth: 0.0,
             depth_rate: 0.0,
+            low: 0.0,
         },
     };
 
     /// The line on which the ray lies.
     #[inline(always)]
     pub fn line(&self) -> Line {
-        Line { origin: self.given.origin, direction: self.given.direction }
+        self.given.line()
     }
 
-    /// A float that is not below the frame's value of the given `t`.
+    /// Within all `t` of interest: the limits rounded inwards.
     #[inline(always)]
-    pub fn t_above(&self, t: f64) -> f32 {
-        f32_above(t * self.t_scale)
+    pub fn t_inside(&self) -> [f32; 2] {
+        let Ray { t_min, t_max, .. } = self.given;
+        [f32_above(f64::from(t_min) * self.t_scale), f32_below(f64::from(t_max) * self.t_scale)]
+    }
+
+    /// What lies between these depths, from the origin, surely is of interest.
+    #[inline(always)]
+    pub fn inner_depths(&self) -> [f32; 2] {
+        let [t_min, t_max] = self.t_inside();
+        let (low, high) = (t_min * self.shear.depth_rate, t_max * self.shear.depth_rate);
+        [low + depth_slack(low), high - depth_slack(high)]
+    }
+
+    /// A float of the frame that is not below the given `t` plus its `error`, and not far above.
+    #[inline(always)]
+    pub fn t_above(&self, t: f64, error: f64) -> f32 {
+        // All boxes that are left wait for this, so mostly it does not wait for the error.
+        let nearest = (t * self.t_scale) as f32;
+        if nearest.abs() >= f32::MIN_POSITIVE && error <= t.abs() * f64::from(UNIT32) {
+            // Off by `u` from rounding, and by `u` from the error: less than `3 u` of what it is now.
+            nearest + nearest.abs() * (4.0 * UNIT32)
+        } else {
+            f32_above((t + error) * self.t_scale)
+        }
     }
 }
 
@@ -254,19 +379,17 @@ mod tests {
                     let ray = ray.prepare(reach).expect("a valid ray");
                     let longest = f32::from_bits(largest_bits(three(ray.direction)));
                     assert!((1.0..2.0).contains(&longest), "{length} {longest}");
-                    assert!(
-                        largest_bits(three(ray.origin)) <= ray.reach.to_bits() && ray.reach <= 4.0
-                    );
                     let size = origin.max(reach);
+                    let reach = size.min(f32::MAX) * ray.scale;
+                    assert!(largest_bits(three(ray.origin)) <= reach.to_bits() && reach <= 4.0);
                     if size >= 1e-37 {
-                        assert!(ray.reach >= 0.5, "{size} {}", ray.reach);
+                        assert!(reach >= 0.5, "{size} {reach}");
                     }
-                    assert_eq!(f64::from(ray.scale), power_of_two(-ray.exponent));
                     // The same point from both descriptions.
                     let given = f64::from(length) * f64::from(ray.scale);
                     assert_eq!(given, f64::from(ray.direction[0]) * ray.t_scale);
-                    assert_eq!((ray.t_min, ray.t_inside[0]), (0.0, 0.0));
-                    assert!(ray.t_max >= ray.t_inside[1]);
+                    assert_eq!((ray.t_min, ray.t_inside()[0]), (0.0, 0.0));
+                    assert!(ray.t_max >= ray.t_inside()[1]);
                 }
             }
         }
@@ -281,8 +404,8 @@ mod tests {
             ([2.0, 2.0, 2.0], [0, 1, 2], 1.0),
         ] {
             let shear = Ray::new([0.0; 3], direction).prepare(1.0).expect("a ray").shear;
-            assert_eq!((shear.axes, shear.depth_sign), (axes, sign), "{direction:?}");
-            assert!(shear.steepness <= 1.0 && (1.0..2.0).contains(&shear.depth_rate));
+            assert_eq!((shear.axes, shear.depth_scale.signum()), (axes, sign), "{direction:?}");
+            assert!(shear.blur <= 6.0 * UNIT32 && (1.0..2.0).contains(&shear.depth_rate));
         }
     }
 }

@@ -41,6 +41,13 @@ impl Ray {
         Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
     }
 
+    /// Its halves, each a vector on most machines.
+    #[inline(always)]
+    fn rows(&self) -> [[f32; 4]; 2] {
+        let Ray { origin: [x, y, z], t_min, direction: [dx, dy, dz], t_max } = *self;
+        [[x, y, z, t_min], [dx, dy, dz, t_max]]
+    }
+
     /// The same ray, limited to `t_min <= t <= t_max`.
     pub const fn with_limits(self, t_min: f32, t_max: f32) -> Self {
         Ray { t_min, t_max, ..self }

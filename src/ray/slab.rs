@@ -29,7 +29,7 @@ pub(crate) trait WideBoxes<S: Width<N>, const N: usize> {
     fn entered<const FUSED: bool>(&self, walls: &[[f32; N]; 6], t_bound: S::V) -> (u32, S::V);
 }
 
-/// Boxes in `f32`, for frames whose exponent is between -60 and 120.
+/// Boxes in `f32`, for ordinary rays.
 ///
 /// With `r` the scaled reciprocal of a component, the distance to a wall is `wall * r - shift`, where
 /// `shift` holds `origin * r` and all that rounding may add. `docs/METHODS.md` derives the padding.
@@ -42,6 +42,15 @@ pub(crate) struct NarrowSlab {
     backwards: [bool; 3],
 }
 
+/// From given numbers to the frame's: powers of two.
+#[derive(Clone, Copy)]
+pub(super) struct Scales {
+    /// Of `t`.
+    pub t: f32,
+    /// Of coordinates.
+    pub space: f32,
+}
+
 impl NarrowSlab {
     /// Nothing in particular.
     pub const BLANK: Self = NarrowSlab {
@@ -52,29 +61,29 @@ impl NarrowSlab {
         backwards: [false; 3],
     };
 
-    /// The ray for boxes, if its frame is neither too small nor too large for them.
+    /// The ray from `origin` along `direction`, as given, for boxes within `reach`. `inverse` are the reciprocals of
+    /// the sizes of the direction's components, and `t_min` is the frame's.
     #[inline(always)]
-    pub fn new<S: Width<4>>(s: S, ray: &PreparedRay) -> Option<Self> {
+    pub(super) fn new<S: Width<4>>(
+        s: S,
+        [origin, direction, inverse]: [S::V; 3],
+        scales: Scales,
+        reach: f32,
+        t_min: f32,
+        backwards: [bool; 3],
+    ) -> Self {
         const NEGLIGIBLE: f32 = 1.0 / (1u64 << 57) as f32;
-        if !(-60..=120).contains(&ray.exponent) {
-            return None;
-        }
-        let (origin, size) = (s.load(&ray.origin), s.load(&ray.inverse));
-        let inverse = size.with_sign_of(s.load(&ray.direction));
-        let relative = origin.abs().mul(s.splat(6.0 * UNIT32)).add(s.splat(NEGLIGIBLE * ray.reach));
-        let pad = size.mul(relative).add(s.splat(12.0 * UNIT32 * ray.reach));
-        let middle = origin.mul(inverse);
-        let mut slab = NarrowSlab {
-            reciprocal: [0.0; 4],
-            near_shift: [0.0; 4],
-            far_shift: [0.0; 4],
-            t_min: ray.t_min,
-            backwards: [0, 1, 2].map(|k| ray.direction[k].is_sign_negative()),
-        };
-        inverse.mul(s.splat(ray.scale)).store(&mut slab.reciprocal);
-        middle.add(pad).store(&mut slab.near_shift);
-        middle.sub(pad).store(&mut slab.far_shift);
-        Some(slab)
+        // What can be computed before the reciprocals are there, which takes the longest.
+        let scale = s.splat(scales.t);
+        let ahead = origin.mul(scale).flipped_by(direction);
+        let relative = s.splat(6.0 * UNIT32);
+        let pad = ahead.abs().mul(relative).add(s.splat(NEGLIGIBLE * (reach * scales.t)));
+        let constant = s.splat(12.0 * UNIT32 * (reach * scales.space));
+        let mut slab = NarrowSlab { t_min, backwards, ..Self::BLANK };
+        inverse.mul(scale).with_sign_of(direction).store(&mut slab.reciprocal);
+        inverse.mul(ahead.add(pad)).add(constant).store(&mut slab.near_shift);
+        inverse.mul(ahead.sub(pad)).sub(constant).store(&mut slab.far_shift);
+        slab
     }
 }
 
@@ -101,7 +110,7 @@ impl Slab for NarrowSlab {
             near_shift: splat(s, self.near_shift),
             far_shift: splat(s, self.far_shift),
             t_min: s.splat(self.t_min),
-            backwards: self.backwards,
+            first: [0, 1, 2].map(|k| if self.backwards[k] { k + 3 } else { k }),
             s,
         }
     }
@@ -119,7 +128,8 @@ struct NarrowBoxes<S, V> {
     near_shift: [V; 3],
     far_shift: [V; 3],
     t_min: V,
-    backwards: [bool; 3],
+    /// The walls that the ray passes first, among lower and upper ones.
+    first: [usize; 3],
 }
 
 impl<S: Width<N>, const N: usize> WideBoxes<S, N> for NarrowBoxes<S, S::V> {
@@ -149,8 +159,8 @@ impl<S, V: Copy> NarrowBoxes<S, V> {
         S: Width<N, V = V>,
         V: Lanes<N>,
     {
-        let (lower, upper) = (&walls[k], &walls[k + 3]);
-        let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
+        let first = &walls[self.first[k]];
+        let last = &walls[2 * k + 3 - self.first[k]];
         let r = self.reciprocal[k];
         Interval {
             near: mul_sub::<V, FUSED, N>(self.s.load(first), r, self.near_shift[k]),
@@ -250,7 +260,7 @@ mod tests {
 
     fn parts(ray: Ray) -> [Interval<f32>; 2] {
         let ray = ray.prepare(1.0).expect("a valid ray");
-        let narrow = NarrowSlab::new(Scalar, &ray).expect("an ordinary frame");
+        let (_, narrow) = ray.given.prepare_with(Scalar, 1.0).expect("an ordinary ray");
         // In given units, as the frame's are twice as long or half.
         [narrow.part(&UNIT_BOX, ray.t_max), WideSlab::new(&ray).part(&UNIT_BOX, ray.t_max)].map(
             |part| {
@@ -290,10 +300,16 @@ mod tests {
     }
 
     #[test]
-    fn frames_at_the_ends_of_the_range_take_wide_boxes() {
-        for (size, narrow) in [(1e-30, false), (1e-17, true), (1e35, true), (3e38, false)] {
-            let ray = Ray::new([size, 0.0, 0.0], [1.0, 0.0, 0.0]).prepare(size).expect("a ray");
-            assert_eq!(NarrowSlab::new(Scalar, &ray).is_some(), narrow, "{size}");
+    fn rays_at_the_ends_of_the_floats_take_wide_boxes() {
+        for (size, narrow) in [(1e-30, false), (1e-17, true), (1e17, true), (3e38, false)] {
+            for ray in [
+                Ray::new([size, 0.0, 0.0], [1.0, 0.0, 0.0]),
+                Ray::new([1.0, 0.0, 0.0], [0.0, size, 1e-3 * size]),
+                Ray::new([0.0, 0.0, size], [0.0, size, size]),
+            ] {
+                assert!(ray.prepare(size).is_some());
+                assert_eq!(ray.prepare_with(Scalar, size).is_some(), narrow, "{size}");
+            }
         }
     }
 }

@@ -9,9 +9,7 @@ use raykern_harness::make::Random;
 use raykern_harness::search::{Worst, samples};
 
 use super::sphere::{chord, sphere};
-use super::triangle::single::{
-    Sieved, area, area_error, coordinate_error, rise_error, sheared, sieve,
-};
+use super::triangle::single::{Sieved, area, area_error, coordinate_error, sheared, sieve};
 use crate::exact::{Distance, Line, Meeting};
 use crate::interval;
 use crate::math::{sum_abs, wide};
@@ -104,19 +102,18 @@ fn triangle_is_right(random: &mut Random, worst: &mut TriangleWorst) -> bool {
     let line = Line { origin, direction: ray.direction };
     let met = ray.prepare(reach).and_then(|_| interval::triangle::meet(&line, corners));
     let Some(ray) = limited(random, ray, met.map(|met| met.t)).prepare(reach) else { return true };
-    let far = met.map(|met| ray.t_above(met.t + met.t_error * 1.01));
+    let far = met.map(|met| ray.t_above(met.t, met.t_error * 1.01));
     let bound = far.filter(|_| random.below(2) == 0).unwrap_or(ray.t_max).min(ray.t_max);
     let sieved = sieve(&ray, bound, corners);
     let hit = || is_within(&line, &Meeting::Triangle(corners), &ray);
-    see_triangle(&ray, corners, met.map(|met| met.t), sieved, worst);
-    let right = match (sieved, met) {
-        (None, Some(_)) => !hit(),
-        (Some(sieved), Some(met)) => {
+    see_triangle(&ray, corners, met.map(|met| met.t), &sieved, worst);
+    let right = match met {
+        Some(_) if sieved.rejected => !hit(),
+        Some(met) => {
             let side = sieved.detail.front.is_none_or(|front| front == met.front);
             side && (!sieved.inside || hit())
         }
-        (None, None) => true,
-        (Some(sieved), None) => !sieved.sure && !sieved.inside,
+        None => sieved.rejected || !sieved.sure && !sieved.inside,
     };
     if !right {
         println!("{ray:?}\n{corners:?}\n{met:?} bound {bound:e}\n{sieved:?}");
@@ -129,7 +126,7 @@ fn see_triangle(
     ray: &PreparedRay,
     corners: [[f32; 3]; 3],
     t: Option<f64>,
-    sieved: Option<Sieved>,
+    sieved: &Sieved,
     worst: &mut TriangleWorst,
 ) {
     let given = &ray.given;
@@ -157,21 +154,19 @@ fn see_triangle(
         let real = real[j][0] * real[k][1] - real[j][1] * real[k][0];
         worst.area.see(f64::from(areas[i]) - real, f64::from(unsure));
     }
-    let (Some(t), Some(sieved)) = (t, sieved) else { return };
+    let Some(t) = t else { return };
     let depth = t * ray.t_scale * f64::from(ray.shear.depth_rate);
-    let total = areas[0] + areas[1] + areas[2];
-    let (to_q, to_r) = (q.raw - p.raw, r.raw - p.raw);
-    let rise = (areas[1] * to_q + areas[2] * to_r) * 1f32.copysign(total);
-    let error = rise_error(unsure, to_q.abs().max(to_r.abs()), p.depth, total.abs());
-    let off = f64::from(rise) - (depth - f64::from(p.depth)) * f64::from(total.abs());
-    worst.rise.see(off, f64::from(error));
-    // Above it by no more than twice the error; NaN says nothing. 2^-90: what is granted at least.
-    let above = depth - f64::from(sieved.least_depth) + 2f64.powi(-90);
-    assert!(!(above < 0.0), "{} {depth}", sieved.least_depth);
+    let Sieved { total, rise, error, middle, .. } = sieved;
+    let total = f64::from(*total);
+    let above_middle = depth + f64::from(ray.shear.origin_depth) - f64::from(*middle);
+    // What this computation may be off itself.
+    let own = depth.abs() * 2f64.powi(-48) * total;
     if sieved.sure {
+        worst.rise.see(f64::from(*rise) - above_middle * total, f64::from(*error) + own);
         let off = (f64::from(sieved.detail.t) * f64::from(ray.shear.depth_rate) - depth).abs();
-        let granted = f64::from(error) / f64::from(total.abs());
-        worst.t.see(off, granted + depth.abs() * 2f64.powi(-22) + 2f64.powi(-140));
+        let granted = f64::from(*error) / total;
+        let rounded = depth.abs() + f64::from(*middle - ray.shear.origin_depth).abs();
+        worst.t.see(off, granted + rounded * 2f64.powi(-22) + 2f64.powi(-140));
     }
 }
 
@@ -286,7 +281,7 @@ fn below_the_least_float_of_the_frame_nothing_is_rejected() {
     let line = Line { origin: ray.origin, direction: ray.direction };
     assert!(is_within(&line, &Meeting::Triangle(corners), &prepared));
     let sieved = sieve(&prepared, prepared.t_max, corners);
-    assert!(sieved.is_some());
+    assert!(!sieved.rejected);
 
     let prepared = ray.with_limits(0.0, 0.75 * unit).prepare(2f32.powi(99)).expect("a ray");
     assert!(sphere(&prepared, prepared.t_max, [0.0, 0.0, 1.5 * unit], 0.4 * unit).is_some());
@@ -300,8 +295,8 @@ fn infinite_limits_are_surely_kept() {
         let ray = Ray::new([0.003, 0.003, 0.01], direction);
         for t_min in [0.0, f32::NEG_INFINITY] {
             let ray = ray.with_limits(t_min, f32::INFINITY).prepare(0.01).expect("a ray");
-            let sieved = sieve(&ray, ray.t_max, corners).expect("a hit");
-            assert!(sieved.sure && sieved.inside, "{direction:?} {t_min}");
+            let sieved = sieve(&ray, ray.t_max, corners);
+            assert!(!sieved.rejected && sieved.sure && sieved.inside, "{direction:?} {t_min}");
         }
     }
 }

@@ -3,9 +3,10 @@
 use glam::Vec3;
 
 use super::TINY;
-use super::meetings::Depths;
-use super::triangle::One;
+use super::meetings::Middle;
+use super::triangle::{One, sheared};
 use super::vector::{cross, dot, sum_abs};
+use crate::math::Aabb;
 use crate::math::rounding::UNIT32;
 use crate::ray::PreparedRay;
 
@@ -24,15 +25,17 @@ pub(crate) struct TriangleDetail {
 
 /// What the filter knows of a triangle that it does not reject.
 pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
-    let One { areas, meetings, first_depth } =
-        One::alone(ray, &Depths::new(ray, ray.t_max), corners);
-    let [[_], [over_b], [over_c]] = areas.over;
-    let ([area_error], [total], [rise]) = (areas.error, meetings.total, meetings.rise);
-    let ([nearest], [farthest]) = (meetings.nearest_depth, meetings.farthest_depth);
+    let middle = Middle::of(ray, &Aabb::around(&corners));
+    let One { areas, meetings } = One::new(ray, &middle, corners);
+    let [[over_a], [over_b], [over_c]] = areas.over;
+    let ([area_error], [size_of_total], [rise]) = (areas.error, meetings.total, meetings.rise);
+    let total = over_a + over_b + over_c;
+    let [a, b, c] = corners.map(|v| sheared(ray, v).0.depth[0]);
+    let (nearest, farthest) = (a.min(b).min(c), a.max(b).max(c));
     // The total carries the errors of three areas, and less than as much again of its own.
-    let is_clear = total.abs() > 6.0 * area_error;
+    let is_clear = size_of_total > 6.0 * area_error;
     // A NaN, from 0 / 0, loses to the depths of the vertices.
-    let depth = (first_depth + rise / total.abs()).max(nearest).min(farthest);
+    let depth = (middle.depth + rise / size_of_total).max(nearest).min(farthest);
     let rate = ray.shear.depth_rate;
     let (t, t_error) = match plane(ray, corners) {
         Some((t, t_error)) => ((t * rate).max(nearest).min(farthest) / rate, t_error),
@@ -42,7 +45,7 @@ pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetai
         t,
         t_error,
         weights: [over_b / total, over_c / total],
-        front: is_clear.then_some((total < 0.0) == (ray.shear.depth_sign > 0.0)),
+        front: is_clear.then_some((total < 0.0) == (ray.shear.depth_scale > 0.0)),
     }
 }
 

@@ -1,122 +1,149 @@
 //! Triangles along the ray: the depth at which it meets their planes, and the limits.
 
 use super::TINY;
-use super::areas::{Areas, Sheared};
+use super::areas::Areas;
+use crate::math::Aabb;
 use crate::math::rounding::UNIT32;
 use crate::ray::PreparedRay;
-use crate::simd::{Lanes, Width};
+use crate::simd::{Lanes, Width, mul_add, mul_sub};
 
-/// The limits of one visit of a block, as depths of the sheared space.
-///
-/// The filter asks with the bound that held when the block was opened, whatever lanes before may have
-/// found since, so that all backends offer the same lanes.
+/// The middle of a box along the ray: depths near it are small numbers, wherever the ray starts.
 #[derive(Clone, Copy)]
-pub(super) struct Depths {
-    pub low: f32,
-    pub high: f32,
-    /// What surely lies within both limits of the ray lies between these.
-    pub inside: [f32; 2],
+pub(super) struct Middle {
+    /// Its depth from the frame's zero, and from the ray's origin.
+    pub raw: f32,
+    pub depth: f32,
+    /// No vertex is further from it.
+    pub half: f32,
+    /// The depth of the vertex that is deepest before or behind the ray's origin.
+    pub deepest: f32,
 }
 
-impl Depths {
+impl Middle {
     #[inline(always)]
-    pub fn new(ray: &PreparedRay, t_bound: f32) -> Self {
-        // A product rounds once. Infinite depths stay as they are: only their finite part is widened.
-        let rate = ray.shear.depth_rate;
-        let slack = |t: f32| (t * rate).abs().min(f32::MAX) * (4.0 * UNIT32);
-        let lower = |t: f32| t * rate - slack(t);
-        let upper = |t: f32| t * rate + slack(t);
-        Depths {
-            // Depths of vertices are off by what scaling to the frame took below its least float.
-            low: lower(ray.t_min) - TINY,
-            high: upper(t_bound) + TINY,
-            inside: [upper(ray.t_inside[0]), lower(ray.t_inside[1])],
-        }
+    pub fn of(ray: &PreparedRay, aabb: &Aabb) -> Self {
+        let k = ray.shear.axes[2];
+        // Halves, as a sum of given coordinates may overflow.
+        let scale = 0.5 * ray.shear.depth_scale;
+        let (lower, upper) = (aabb.lower[k] * scale, aabb.upper[k] * scale);
+        let (raw, half) = (lower + upper, (upper - lower).abs());
+        let depth = raw - ray.shear.origin_depth;
+        // What half and middle were rounded by, and what fell below the frame's least float.
+        let slack = (lower.abs() + upper.abs()) * (4.0 * UNIT32) + TINY;
+        Middle { raw, depth, half: half + slack, deepest: depth.abs() + half }
+    }
+
+    /// What is beyond these depths from here is not within `t_min` and `t_bound`.
+    #[inline(always)]
+    pub fn window(&self, ray: &PreparedRay, t_bound: f32) -> [f32; 2] {
+        let slack = self.depth.abs() * (3.0 * UNIT32);
+        let [low, high] = [ray.shear.low, ray.shear.high(t_bound)];
+        [(low - self.depth) - slack, (high - self.depth) + slack]
+    }
+
+    /// What is within these depths from here surely is within the limits of the ray.
+    #[inline(always)]
+    pub fn inner_window(&self, ray: &PreparedRay) -> [f32; 2] {
+        let slack = self.depth.abs() * (3.0 * UNIT32);
+        let [low, high] = ray.inner_depths();
+        [(low - self.depth) + slack, (high - self.depth) - slack]
     }
 }
 
-/// What `rise` may be off the depth of the meeting times the total area, and what the comparison of
-/// both with a limit may be off, even if the total has the wrong sign.
-#[inline(always)]
-pub(super) fn rise_error<S: Width<N>, const N: usize>(
-    s: S,
-    area_error: S::V,
-    span: S::V,
-    depth: S::V,
-    size_of_total: S::V,
-) -> S::V {
-    let of_areas = area_error.mul(span.mul(s.splat(20.0)));
-    let of_depth = depth.abs().add(span).mul(size_of_total).mul(s.splat(5.0 * UNIT32));
-    of_areas.add(of_depth).add(s.splat(TINY))
-}
-
-/// Where the ray's line meets the planes of triangles.
+/// Where the ray's line meets the planes of triangles, if it passes between their edges.
+#[derive(Clone, Copy)]
 pub(super) struct Meetings<V> {
-    /// Lanes that the ray surely does not meet within its limits and up to the bound.
-    pub past: u32,
-    /// Lanes whose real `t` surely is within the ray's limits, if the line passes between the edges.
-    pub inside: u32,
+    /// The sum of the areas, without its sign.
     pub total: V,
-    /// The depth of the meeting, from that of the first vertex, times the size of `total`.
+    /// The depth of the meeting, from the middle of the box, times `total`.
     pub rise: V,
-    /// What it may be off, even if the total has the wrong sign.
+    /// What a comparison of `rise` with the product of `total` and a depth within the box may be off, even if the sum has
+    /// the wrong sign. Depths beyond it are told from all meetings anyway.
     pub error: V,
-    pub nearest_depth: V,
-    pub farthest_depth: V,
 }
 
 impl<V: Copy> Meetings<V> {
+    /// `raw` are the depths of the corners from the frame's zero.
     #[inline(always)]
-    pub fn new<S: Width<N, V = V>, const N: usize>(
+    pub fn new<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
         s: S,
-        depths: &Depths,
+        middle: &Middle,
         areas: &Areas<V>,
-        [a, b, c]: &[Sheared<V>; 3],
+        raw: &[V; 3],
     ) -> Self
     where
         V: Lanes<N>,
     {
-        let nearest_depth = a.depth.min(b.depth).min(c.depth);
-        let farthest_depth = a.depth.max(b.depth).max(c.depth);
-        let slack = s.splat(2.0 * UNIT32);
-        let (high, low) = (s.splat(depths.high), s.splat(depths.low));
-        let too_far = high.less(nearest_depth.sub(nearest_depth.abs().mul(slack)));
-        let too_near = farthest_depth.add(farthest_depth.abs().mul(slack)).less(low);
         let [over_a, over_b, over_c] = areas.over;
+        let [a, b, c] = raw;
         let total = over_a.add(over_b).add(over_c);
-        let size_of_total = total.abs();
-        let (to_b, to_c) = (b.raw.sub(a.raw), c.raw.sub(a.raw));
-        let rise = over_b.mul(to_b).add(over_c.mul(to_c)).flipped_by(total);
-        let span = to_b.abs().max(to_c.abs());
-        let error = rise_error(s, areas.error, span, a.depth, size_of_total);
-        let minus_error = s.splat(0.0).sub(error);
-        // Positive where the meeting is beyond that depth.
-        let past_high = rise.sub(high.sub(a.depth).mul(size_of_total));
-        let past_low = rise.sub(low.sub(a.depth).mul(size_of_total));
-        let inside_low = rise.sub(s.splat(depths.inside[0]).sub(a.depth).mul(size_of_total));
-        let inside_high = rise.sub(s.splat(depths.inside[1]).sub(a.depth).mul(size_of_total));
-        let beyond = error.less(past_high) | past_low.less(minus_error);
-        Meetings {
-            past: too_far | too_near | beyond,
-            inside: error.less(inside_low) & inside_high.less(minus_error),
-            total,
-            rise,
-            error,
-            nearest_depth,
-            farthest_depth,
-        }
+        let from_middle = s.splat(middle.raw);
+        let rise = over_a.mul(a.sub(from_middle));
+        let rise = mul_add::<V, FUSED, N>(over_b, b.sub(from_middle), rise);
+        let rise = mul_add::<V, FUSED, N>(over_c, c.sub(from_middle), rise).flipped_by(total);
+        let error = areas.error.mul(s.splat(16.0 * middle.half)).add(s.splat(TINY));
+        Meetings { total: total.abs(), rise, error }
     }
 
-    /// What the depth of the meeting is surely not below, by the depth of the first vertex. NaN, or minus
-    /// infinity, where the total is zero.
+    /// Lanes that the ray surely does not meet between these depths.
     #[inline(always)]
-    pub fn least_depth<S: Width<N, V = V>, const N: usize>(&self, s: S, first_depth: V) -> V
+    pub fn outside<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
+        &self,
+        s: S,
+        [low, high]: [f32; 2],
+    ) -> u32
     where
         V: Lanes<N>,
     {
-        let above_first = self.rise.sub(self.error).div(self.total.abs());
-        // Three roundings.
-        let slack = first_depth.abs().add(above_first.abs()).mul(s.splat(4.0 * UNIT32));
-        first_depth.add(above_first).sub(slack)
+        let before = mul_sub::<V, FUSED, N>(self.total, s.splat(low), self.rise);
+        let not_past = mul_sub::<V, FUSED, N>(self.total, s.splat(high), self.rise);
+        self.error.less(before) | not_past.less(s.splat(0.0).sub(self.error))
+    }
+
+    /// Lanes that the ray surely meets between these depths, if its line passes between the edges.
+    #[inline(always)]
+    pub fn inside<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
+        &self,
+        s: S,
+        [low, high]: [f32; 2],
+    ) -> u32
+    where
+        V: Lanes<N>,
+    {
+        let before = mul_sub::<V, FUSED, N>(self.total, s.splat(low), self.rise);
+        let not_past = mul_sub::<V, FUSED, N>(self.total, s.splat(high), self.rise);
+        before.less(s.splat(0.0).sub(self.error)) & self.error.less(not_past)
+    }
+
+    /// In memory.
+    #[inline(always)]
+    pub fn stored<const N: usize>(&self) -> Meetings<[f32; N]>
+    where
+        V: Lanes<N>,
+    {
+        let mut stored = Meetings::NOWHERE;
+        self.total.store(&mut stored.total);
+        self.rise.store(&mut stored.rise);
+        self.error.store(&mut stored.error);
+        stored
+    }
+}
+
+impl<const N: usize> Meetings<[f32; N]> {
+    pub const NOWHERE: Self = Meetings { total: [0.0; N], rise: [0.0; N], error: [0.0; N] };
+
+    /// Back in registers.
+    #[inline(always)]
+    pub fn loaded<S: Width<N>>(&self, s: S) -> Meetings<S::V> {
+        Meetings {
+            total: s.load(&self.total),
+            rise: s.load(&self.rise),
+            error: s.load(&self.error),
+        }
+    }
+
+    pub fn set(&mut self, lane: usize, one: &Meetings<[f32; 1]>) {
+        ([self.total[lane]], [self.rise[lane]], [self.error[lane]]) =
+            (one.total, one.rise, one.error);
     }
 }

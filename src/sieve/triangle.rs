@@ -1,62 +1,66 @@
 //! The filter of triangles, in `f32`: it rejects what the ray surely does not meet.
 
-use super::areas::{AreaError, Areas, Sheared, deepest, shared_error};
-use super::meetings::{Depths, Meetings};
+use super::areas::{Across, Along, AreaError, Areas, shared_error};
+use super::meetings::{Meetings, Middle};
 use crate::block::leaf::TriangleBlock;
-use crate::math::Aabb;
 use crate::ray::PreparedRay;
 use crate::simd::{Lanes, Scalar, Simd, Width};
 
 /// What is left of a block, one bit a lane.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Triangles {
+///
+/// Conservative for every finite triangle and prepared ray: what is rejected is not met in real
+/// arithmetic, and `sure` and `inside` are only said of what is so. The bounds grow with the triangle's own size across
+/// the ray and with the depth of its block. `docs/METHODS.md` derives the constants.
+pub(crate) struct Triangles<V> {
     /// Lanes that the filter could not reject.
     pub candidates: u32,
     /// Those between whose edges the ray's line surely passes.
     pub sure: u32,
-    /// Those of them whose real `t` surely is within the ray's limits.
-    pub inside: u32,
-    /// What the depth of the meeting in each candidate is surely not below; NaN where this is not known.
-    least_depths: [f32; 16],
+    middle: Middle,
+    meetings: Meetings<V>,
 }
 
-impl Triangles {
-    const NONE: Self =
-        Triangles { candidates: 0, sure: 0, inside: 0, least_depths: [f32::NAN; 16] };
-
-    /// The lane of `lanes` whose meeting may come first; those of which it is not known, before.
+impl<V: Lanes<16>> Triangles<V> {
+    /// The sure lanes whose real `t` surely is within the ray's limits.
     #[inline(always)]
-    pub fn nearest(&self, lanes: u32) -> Option<u32> {
-        let (mut rest, mut nearest, mut least) = (lanes, None, f32::INFINITY);
-        while rest != 0 {
-            let lane = rest.trailing_zeros();
-            rest &= rest - 1;
-            let depth = self.least_depths[lane as usize % 16];
-            if nearest.is_none() || !(depth >= least) {
-                (nearest, least) = (Some(lane), depth);
-            }
-        }
-        nearest
+    pub fn inside<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay) -> u32 {
+        self.sure & self.meetings.inside::<S, true, 16>(s, self.middle.inner_window(ray))
+    }
+
+    /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
+    #[inline(always)]
+    pub fn nearest<S: Simd + Width<16, V = V>>(&self, s: S, lanes: u32) -> u32 {
+        const NUMBERS: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+        // Above zero, as the order is that of bits.
+        let ahead = Width::<16>::splat(s, 2.0 * self.middle.half);
+        let depth = self.meetings.rise.div(self.meetings.total).add(ahead);
+        Width::<16>::nearest(s, lanes, depth, &NUMBERS).1
     }
 
     /// The lanes whose meeting may come up to `t_bound`.
     #[inline(always)]
-    pub fn up_to(&self, ray: &PreparedRay, t_bound: f32) -> u32 {
-        let high = Depths::new(ray, t_bound).high;
-        let beyond = |(lane, depth): (usize, &f32)| u32::from(*depth > high) << lane;
-        !self.least_depths.iter().enumerate().map(beyond).fold(0, |all, lane| all | lane)
+    pub fn up_to<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
+        !self.meetings.outside::<S, false, 16>(s, self.middle.window(ray, t_bound))
+    }
+
+    /// In memory, for those whom registers cannot be lent to.
+    #[inline(always)]
+    pub fn stored(&self) -> Triangles<[f32; 16]> {
+        let Triangles { candidates, sure, middle, meetings } = *self;
+        Triangles { candidates, sure, middle, meetings: meetings.stored() }
     }
 }
 
-/// So many candidates are decided one by one, without looking at their depths together first.
-const DIRECT: u32 = 1;
+impl Triangles<[f32; 16]> {
+    /// Back in registers.
+    #[inline(always)]
+    pub fn loaded<S: Simd>(&self, s: S) -> Triangles<<S as Width<16>>::V> {
+        let Triangles { candidates, sure, middle, ref meetings } = *self;
+        Triangles { candidates, sure, middle, meetings: meetings.loaded(s) }
+    }
+}
 
 /// The filter for the `lanes` of a block, all at once unless they are few for the backend.
-///
-/// Conservative for every finite triangle and prepared ray: what is rejected is not met in real
-/// arithmetic, and `sure` and `inside` are only said of what is so. All bounds are for a lane
-/// alone, but for the depth of its block: they grow with the triangle's own size in the sheared plane.
-/// `docs/METHODS.md` derives the constants.
 ///
 /// With `FREE`, the lanes that are left are none that the ray meets, but else may be others on another
 /// backend; without, no operation is fused and every backend leaves the same ones.
@@ -69,144 +73,106 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     t_bound: f32,
     block: &TriangleBlock,
     lanes: u32,
-) -> Triangles {
-    let error = AreaError::new(shared_error(ray, deepest(ray, &block.aabb)));
+) -> Triangles<<S as Width<16>>::V> {
+    let middle = Middle::of(ray, &block.aabb);
+    let window = middle.window(ray, t_bound);
     if S::FEW > 0 && lanes.count_ones() <= S::FEW {
-        return few(ray, t_bound, &error, block, lanes);
+        return few(ray, middle, window, block, lanes).loaded(s);
     }
-    let vertices = Sheared::new::<S, FREE, 16>(s, ray, &block.vertices);
-    let corners = corners(s, &vertices, &block.corners);
+    let error = AreaError::new(shared_error(ray, middle.deepest));
+    let along = Along::new(s, ray, &block.vertices);
+    let across = Across::new::<S, FREE, 16>(s, ray, &block.vertices, &along);
+    let [a, b, c] = &block.corners;
+    let corners = [corner(s, &across, a), corner(s, &across, b), corner(s, &across, c)];
+    let raw = [s.corners(along.raw, a), s.corners(along.raw, b), s.corners(along.raw, c)];
     let areas = Areas::new::<S, FREE, 16>(s, &error, &corners);
-    let candidates = lanes & !areas.outside(s);
-    if candidates == 0 {
-        return Triangles::NONE;
-    }
-    let sure = candidates & areas.sure(s);
-    if FREE && candidates.count_ones() <= DIRECT {
-        return Triangles { candidates, sure, ..Triangles::NONE };
-    }
-    let meetings = Meetings::new(s, &Depths::new(ray, t_bound), &areas, &corners);
-    let candidates = candidates & !meetings.past;
-    let mut found = Triangles {
-        candidates,
-        sure: sure & candidates,
-        inside: sure & candidates & meetings.inside,
-        ..Triangles::NONE
-    };
-    meetings.least_depth(s, corners[0].depth).store(&mut found.least_depths);
-    found
+    let meetings = Meetings::new::<S, FREE, 16>(s, &middle, &areas, &raw);
+    let outside = areas.outside(s) | meetings.outside::<S, FREE, 16>(s, window);
+    let candidates = lanes & !outside;
+    Triangles { candidates, sure: candidates & areas.sure(s), middle, meetings }
 }
 
-/// The corners of all triangles of a block, out of its vertices.
-#[inline(always)]
-fn corners<S: Simd>(
-    s: S,
-    vertices: &Sheared<<S as Width<16>>::V>,
-    lists: &[[u8; 8]; 3],
-) -> [Sheared<<S as Width<16>>::V>; 3] {
-    let [a, b, c] = lists;
-    [corner(s, vertices, a), corner(s, vertices, b), corner(s, vertices, c)]
-}
-
+/// The corners that `list` names out of the vertices of a block.
 #[inline(always)]
 fn corner<S: Simd>(
     s: S,
-    vertices: &Sheared<<S as Width<16>>::V>,
+    vertices: &Across<<S as Width<16>>::V>,
     list: &[u8; 8],
-) -> Sheared<<S as Width<16>>::V> {
-    Sheared {
+) -> Across<<S as Width<16>>::V> {
+    Across {
         x: s.corners(vertices.x, list),
         y: s.corners(vertices.y, list),
         size: s.corners(vertices.size, list),
-        raw: s.corners(vertices.raw, list),
-        depth: s.corners(vertices.depth, list),
     }
 }
 
 /// The filter, lane by lane.
+#[inline(never)]
 fn few(
     ray: &PreparedRay,
-    t_bound: f32,
-    error: &AreaError,
+    middle: Middle,
+    window: [f32; 2],
     block: &TriangleBlock,
     lanes: u32,
-) -> Triangles {
-    let depths = Depths::new(ray, t_bound);
-    let mut found = Triangles::NONE;
+) -> Triangles<[f32; 16]> {
+    let mut found = Triangles { candidates: 0, sure: 0, middle, meetings: Meetings::NOWHERE };
     let mut rest = lanes;
     while rest != 0 {
         let lane = rest.trailing_zeros();
         rest &= rest - 1;
-        let one = One::new(ray, &depths, error, block.triangle(lane as usize));
-        if !one.is_rejected() {
+        let One { areas, meetings } = One::new(ray, &middle, block.triangle(lane as usize));
+        if (areas.outside(Scalar) | meetings.outside::<_, false, 1>(Scalar, window)) == 0 {
             found.candidates |= 1 << lane;
-            found.sure |= u32::from(one.is_sure()) << lane;
-            found.inside |= u32::from(one.is_inside()) << lane;
-            [found.least_depths[lane as usize % 16]] =
-                one.meetings.least_depth(Scalar, [one.first_depth]);
+            found.sure |= areas.sure(Scalar) << lane;
+            found.meetings.set(lane as usize % 16, &meetings);
         }
     }
     found
 }
 
-/// The filter for one triangle.
+/// What the filter computes of one triangle.
 pub(super) struct One {
     pub areas: Areas<[f32; 1]>,
     pub meetings: Meetings<[f32; 1]>,
-    pub first_depth: f32,
 }
 
 impl One {
+    /// For a box that holds it.
     #[inline(always)]
-    fn new(ray: &PreparedRay, depths: &Depths, error: &AreaError, corners: [[f32; 3]; 3]) -> One {
+    pub fn new(ray: &PreparedRay, middle: &Middle, corners: [[f32; 3]; 3]) -> One {
+        let error = AreaError::new(shared_error(ray, middle.deepest));
         let corners = corners.map(|v| sheared(ray, v));
-        let areas = Areas::new::<Scalar, false, 1>(Scalar, error, &corners);
-        let meetings = Meetings::new(Scalar, depths, &areas, &corners);
-        One { areas, meetings, first_depth: corners[0].depth[0] }
-    }
-
-    /// A triangle by itself, not in a block.
-    pub fn alone(ray: &PreparedRay, depths: &Depths, corners: [[f32; 3]; 3]) -> One {
-        let error = AreaError::new(shared_error(ray, deepest(ray, &Aabb::around(&corners))));
-        One::new(ray, depths, &error, corners)
-    }
-
-    fn is_rejected(&self) -> bool {
-        self.areas.outside(Scalar) | self.meetings.past != 0
-    }
-
-    fn is_sure(&self) -> bool {
-        self.areas.sure(Scalar) != 0
-    }
-
-    fn is_inside(&self) -> bool {
-        self.is_sure() && self.meetings.inside != 0
+        let (along, across) = (corners.map(|v| v.0.raw), corners.map(|v| v.1));
+        let areas = Areas::new::<Scalar, false, 1>(Scalar, &error, &across);
+        let meetings = Meetings::new::<Scalar, false, 1>(Scalar, middle, &areas, &along);
+        One { areas, meetings }
     }
 }
 
-fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared<[f32; 1]> {
-    Sheared::new::<Scalar, false, 1>(Scalar, ray, &vertex.map(|x| [x]))
+pub(super) fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> (Along<[f32; 1]>, Across<[f32; 1]>) {
+    let vertex = vertex.map(|x| [x]);
+    let along = Along::new(Scalar, ray, &vertex);
+    (along, Across::new::<Scalar, false, 1>(Scalar, ray, &vertex, &along))
 }
 
 /// The pieces of the filter for one lane, for the tests of its bounds.
 #[cfg(test)]
 pub(super) mod single {
     use super::super::detail::{TriangleDetail, detail};
-    use super::super::meetings;
-    use super::{AreaError, Depths, One, PreparedRay, Scalar, shared_error};
+    use super::{Across, Along, AreaError, Middle, One, PreparedRay, Scalar, shared_error};
+    use crate::math::Aabb;
     use crate::math::rounding::UNIT32;
 
     pub struct Sheared {
         pub x: f32,
         pub y: f32,
-        pub raw: f32,
         pub depth: f32,
     }
 
     pub fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
-        let super::Sheared { x: [x], y: [y], raw: [raw], depth: [depth], .. } =
+        let (Along { depth: [depth], .. }, Across { x: [x], y: [y], .. }) =
             super::sheared(ray, vertex);
-        Sheared { x: -x, y: -y, raw, depth }
+        Sheared { x: -x, y: -y, depth }
     }
 
     pub fn area(p: &Sheared, q: &Sheared) -> f32 {
@@ -222,25 +188,36 @@ pub(super) mod single {
         error.of::<Scalar, false, 1>(Scalar, [size])[0]
     }
 
-    pub fn rise_error(area_error: f32, span: f32, depth: f32, size_of_total: f32) -> f32 {
-        meetings::rise_error(Scalar, [area_error], [span], [depth], [size_of_total])[0]
-    }
-
+    /// What the sieve computes of the depth of a triangle, and what it says of it.
     #[derive(Clone, Copy, Debug)]
     pub struct Sieved {
+        pub rejected: bool,
         pub sure: bool,
         pub inside: bool,
-        pub least_depth: f32,
+        /// The depth of the middle, without rounding from the frame's zero.
+        pub middle: f32,
+        pub total: f32,
+        pub rise: f32,
+        pub error: f32,
         pub detail: TriangleDetail,
     }
 
-    pub fn sieve(ray: &PreparedRay, t_bound: f32, corners: [[f32; 3]; 3]) -> Option<Sieved> {
-        let one = One::alone(ray, &Depths::new(ray, t_bound), corners);
-        (!one.is_rejected()).then(|| Sieved {
-            sure: one.is_sure(),
-            inside: one.is_inside(),
-            least_depth: one.meetings.least_depth(Scalar, [one.first_depth])[0],
+    pub fn sieve(ray: &PreparedRay, t_bound: f32, corners: [[f32; 3]; 3]) -> Sieved {
+        let middle = Middle::of(ray, &Aabb::around(&corners));
+        let One { areas, meetings } = One::new(ray, &middle, corners);
+        let outside = meetings.outside::<_, false, 1>(Scalar, middle.window(ray, t_bound));
+        let inside = meetings.inside::<_, false, 1>(Scalar, middle.inner_window(ray));
+        let sure = areas.sure(Scalar) != 0;
+        let ([total], [rise], [error]) = (meetings.total, meetings.rise, meetings.error);
+        Sieved {
+            rejected: areas.outside(Scalar) | outside != 0,
+            sure,
+            inside: sure && inside != 0,
+            middle: middle.raw,
+            total,
+            rise,
+            error,
             detail: detail(ray, corners),
-        })
+        }
     }
 }

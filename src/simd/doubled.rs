@@ -34,6 +34,12 @@ macro_rules! two {
             }
 
             #[inline(always)]
+            fn fast_mul_add(self, factor: Self, other: Self) -> Self {
+                let low = self.0.fast_mul_add(factor.0, other.0);
+                Two(low, self.1.fast_mul_add(factor.1, other.1))
+            }
+
+            #[inline(always)]
             fn less(self, other: Self) -> u32 {
                 self.0.less(other.0) | self.1.less(other.1) << $half
             }

@@ -48,24 +48,25 @@ pub(crate) trait Lanes<const N: usize>: Copy {
     /// `self * factor - other`, with one rounding or two: not the same bits from every backend, so
     /// only where the bound allows for both and nothing of it is answered.
     fn fast_mul_sub(self, factor: Self, other: Self) -> Self;
+    /// `self * factor + other`, likewise.
+    fn fast_mul_add(self, factor: Self, other: Self) -> Self;
     /// One bit for each lane in which `self < other`, the first the lowest; none for NaN.
     fn less(self, other: Self) -> u32;
     /// One bit for each lane in which `self <= other`; none for NaN.
     fn less_or_equal(self, other: Self) -> u32;
     fn store(self, out: &mut [f32; N]);
-    /// Writes the lanes of `mask` in order to the front of `out`, and anything behind them.
-    #[inline(always)]
-    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]) {
-        let mut lanes = [0.0; N];
-        self.store(&mut lanes);
-        scalar::compress(&lanes, mask, out);
-    }
 }
 
 /// `a * b - c`, fused where that is faster if `FUSED` says that the bits need not be those of others.
 #[inline(always)]
 pub(crate) fn mul_sub<V: Lanes<N>, const FUSED: bool, const N: usize>(a: V, b: V, c: V) -> V {
     if FUSED { a.fast_mul_sub(b, c) } else { a.mul(b).sub(c) }
+}
+
+/// `a * b + c`, likewise.
+#[inline(always)]
+pub(crate) fn mul_add<V: Lanes<N>, const FUSED: bool, const N: usize>(a: V, b: V, c: V) -> V {
+    if FUSED { a.fast_mul_add(b, c) } else { a.mul(b).add(c) }
 }
 
 /// A backend's vectors of `N` lanes.
@@ -77,6 +78,25 @@ pub(crate) trait Width<const N: usize>: Copy {
     #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]) {
         scalar::compress(words, mask, out);
+    }
+
+    /// Writes the words of `mask`, two lanes at least, and their `near` to the front of the columns, far ones first, and
+    /// anything behind them. Returns the word of the last, which is nearest.
+    ///
+    /// They are in the order of keys: `near` as integers whose lowest bits are replaced by the number of the lane
+    /// among those of `mask`; two bits for up to four of them, three for up to eight, otherwise four.
+    #[inline(always)]
+    fn sort(
+        self,
+        mask: u32,
+        near: Self::V,
+        words: &[u32; N],
+        near_out: &mut [MaybeUninit<f32>; N],
+        words_out: &mut [MaybeUninit<u32>; N],
+    ) -> u32 {
+        let mut lanes = [0.0; N];
+        near.store(&mut lanes);
+        scalar::sort(mask, &lanes, words, near_out, words_out)
     }
 
     /// Of the lanes of `mask`, counted from the lowest, the number of one in which `near` is nearly least, and
@@ -97,6 +117,16 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// Whether batches keep several rays in flight: where vectors are fast enough to wait for memory. Elsewhere it
     /// would only be one more copy of the code.
     const FLIES: bool = false;
+
+    /// In the first three lanes the largest of them; any number if one is NaN.
+    #[inline(always)]
+    fn largest_of_three(self, v: <Self as Width<4>>::V) -> <Self as Width<4>>::V {
+        let mut lanes = [0.0; 4];
+        v.store(&mut lanes);
+        let [x, y, z, _] = lanes;
+        let larger = if x > y { x } else { y };
+        Width::<4>::splat(self, if larger > z { larger } else { z })
+    }
 
     /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
     /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
@@ -128,7 +158,7 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     #[inline(always)]
     fn prefetch<T>(self, _what: &T) {}
 
-    /// Runs `kernel` with the backend's instructions; all that it inlines may use them.
+    /// Runs `kernel` with the backend's instructions, in a function of its own; all that it inlines may use them.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
 }
 
@@ -195,6 +225,12 @@ pub(crate) trait Kernel {
 pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     // SAFETY: `current` is never above what `detected` found on this processor.
     unsafe { native::run_with(Backend::current(), kernel) }
+}
+
+/// Lets the processor fetch `what`, if it can be told to.
+#[inline(always)]
+pub(crate) fn prefetch<T>(what: &T) {
+    native::prefetch(what);
 }
 
 /// The lane that `list` names for lane `i`: see [`Simd::corners`].

@@ -15,3 +15,7 @@ pub(super) fn detect() -> Backend {
 pub(super) unsafe fn run_with<K: Kernel>(_backend: Backend, kernel: K) -> K::Output {
     Scalar.run(kernel)
 }
+
+/// Nothing.
+#[inline(always)]
+pub(super) fn prefetch<T>(_what: &T) {}

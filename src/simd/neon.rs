@@ -85,7 +85,7 @@ impl Simd for Neon {
         }
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)
     }
@@ -152,6 +152,12 @@ impl Lanes<4> for F4 {
     }
 
     #[inline(always)]
+    fn fast_mul_add(self, factor: Self, other: Self) -> Self {
+        // SAFETY: NEON is there.
+        F4(unsafe { vfmaq_f32(other.0, self.0, factor.0) })
+    }
+
+    #[inline(always)]
     fn less(self, other: Self) -> u32 {
         // SAFETY: NEON is there.
         unsafe { mask(vcltq_f32(self.0, other.0)) }
@@ -169,3 +175,7 @@ impl Lanes<4> for F4 {
         unsafe { vst1q_f32(out.as_mut_ptr(), self.0) }
     }
 }
+
+/// Nothing: processors with these instructions fetch ahead by themselves.
+#[inline(always)]
+pub(super) fn prefetch<T>(_what: &T) {}

@@ -30,6 +30,41 @@ pub(super) fn compress<T: Copy, const N: usize>(
     }
 }
 
+/// See [`Width::sort`].
+#[inline(always)]
+pub(super) fn sort<const N: usize>(
+    mask: u32,
+    near: &[f32; N],
+    words: &[u32; N],
+    near_out: &mut [MaybeUninit<f32>; N],
+    words_out: &mut [MaybeUninit<u32>; N],
+) -> u32 {
+    let numbers = match mask.count_ones() {
+        0..=4 => 3,
+        5..=8 => 7,
+        _ => 15,
+    };
+    // Each key is put in front of the smaller ones.
+    let (mut keys, mut lanes) = ([0; N], [0; N]);
+    let (mut rest, mut count) = (mask, 0);
+    while let Some(t) = near.get(rest.trailing_zeros() as usize) {
+        let key = t.to_bits() as i32 & !numbers | count as i32;
+        let mut place = count;
+        while place > 0 && keys[place - 1] < key {
+            (keys[place], lanes[place]) = (keys[place - 1], lanes[place - 1]);
+            place -= 1;
+        }
+        (keys[place], lanes[place]) = (key, rest.trailing_zeros() as usize);
+        count += 1;
+        rest &= rest - 1;
+    }
+    for ((lane, near_out), words_out) in lanes[..count].iter().zip(near_out).zip(words_out) {
+        near_out.write(near[*lane]);
+        words_out.write(words[*lane]);
+    }
+    count.checked_sub(1).map_or(u32::MAX, |last| words[lanes[last]])
+}
+
 /// See [`Width::nearest`].
 #[inline(always)]
 pub(super) fn nearest<const N: usize>(
@@ -127,6 +162,11 @@ impl<const N: usize> Lanes<N> for [f32; N] {
     }
 
     #[inline(always)]
+    fn fast_mul_add(self, factor: Self, other: Self) -> Self {
+        self.mul(factor).add(other)
+    }
+
+    #[inline(always)]
     fn less(self, other: Self) -> u32 {
         mask(self, other, |a, b| a < b)
     }
@@ -139,11 +179,6 @@ impl<const N: usize> Lanes<N> for [f32; N] {
     #[inline(always)]
     fn store(self, out: &mut [f32; N]) {
         *out = self;
-    }
-
-    #[inline(always)]
-    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; N]) {
-        compress(&self, mask, out);
     }
 }
 
@@ -174,7 +209,7 @@ impl Simd for Scalar {
         core::array::from_fn(|i| table[corner(list, i)])
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)
     }

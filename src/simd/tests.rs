@@ -36,11 +36,13 @@ struct Answers<const N: usize> {
     /// Where these are NaN, any NaN will do.
     computed: [(&'static str, [f32; N]); 4],
     fast_mul_sub: [f32; N],
+    fast_mul_add: [f32; N],
     less: u32,
     less_or_equal: u32,
     /// What compressing left at the front.
-    front: Vec<u32>,
     front_words: Vec<u32>,
+    /// Both columns of two lanes at least, sorted, and the last word.
+    sorted: Option<(Vec<u32>, Vec<u32>, u32)>,
     /// The nearest of the lanes of a mask, if that has any.
     nearest: Option<(usize, u32)>,
 }
@@ -78,19 +80,26 @@ fn stored<const N: usize, V: Lanes<N>>(v: V) -> [f32; N] {
     lanes
 }
 
+fn written<T: Copy>(front: &[MaybeUninit<T>]) -> Vec<T> {
+    // SAFETY: compressing and sorting write as many as the mask has bits.
+    front.iter().map(|x| unsafe { x.assume_init() }).collect()
+}
+
 #[inline(always)]
 fn answers<const N: usize, S: Width<N>>(s: S, input: &Input) -> Answers<N> {
     let lanes = input.lanes.map(|lanes| *lanes.first_chunk::<N>().expect("16 lanes are enough"));
     let (a, b, c) = (s.load(&lanes[0]), s.load(&lanes[1]), s.load(&lanes[2]));
     let mask = input.bits as u32 & ((1 << N) - 1);
-    let (mut front, mut front_words) = ([MaybeUninit::uninit(); N], [MaybeUninit::uninit(); N]);
-    a.compress(mask, &mut front);
-    s.compress_words(mask, &lanes[1].map(f32::to_bits), &mut front_words);
+    let words = lanes[1].map(f32::to_bits);
+    let (mut near, mut front) = ([MaybeUninit::uninit(); N], [MaybeUninit::uninit(); N]);
+    s.compress_words(mask, &words, &mut front);
     let count = mask.count_ones() as usize;
-    // SAFETY: compressing wrote as many as `mask` has bits.
-    let front = front[..count].iter().map(|x| unsafe { x.assume_init() }.to_bits()).collect();
-    // SAFETY: as above.
-    let front_words = front_words[..count].iter().map(|x| unsafe { x.assume_init() }).collect();
+    let front_words = written(&front[..count]);
+    let sorted = (count > 1).then(|| {
+        let last = s.sort(mask, a, &words, &mut near, &mut front);
+        let near = written(&near[..count]).into_iter().map(f32::to_bits).collect();
+        (near, written(&front[..count]), last)
+    });
     Answers {
         moved: [
             ("min", stored(a.min(b))),
@@ -107,10 +116,11 @@ fn answers<const N: usize, S: Width<N>>(s: S, input: &Input) -> Answers<N> {
             ("div", stored(a.div(b))),
         ],
         fast_mul_sub: stored(a.fast_mul_sub(b, c)),
+        fast_mul_add: stored(a.fast_mul_add(b, c)),
         less: a.less(b),
         less_or_equal: a.less_or_equal(b),
-        front,
         front_words,
+        sorted,
         nearest: (mask != 0).then(|| s.nearest(mask, a, &lanes[1].map(f32::to_bits))),
     }
 }
@@ -154,9 +164,14 @@ fn compare<const N: usize>(got: &Answers<N>, expected: &Answers<N>, lanes: &[[f3
         let right = alike(got, twice) || alike(got, once);
         assert!(right, "fast_mul_sub: {got}, neither {twice} nor {once}, {}", context());
     }
+    for (i, got) in got.fast_mul_add.into_iter().enumerate() {
+        let (twice, once) = (a[i] * b[i] + c[i], a[i].mul_add(b[i], c[i]));
+        let right = alike(got, twice) || alike(got, once);
+        assert!(right, "fast_mul_add: {got}, neither {twice} nor {once}, {}", context());
+    }
     assert_eq!(got.less, expected.less, "less, {}", context());
     assert_eq!(got.less_or_equal, expected.less_or_equal, "less_or_equal, {}", context());
-    assert_eq!(got.front, expected.front, "compress, {}", context());
+    assert_eq!(got.sorted, expected.sorted, "sort, {}", context());
     assert_eq!(got.front_words, expected.front_words, "compress_words, {}", context());
     assert_eq!(got.nearest, expected.nearest, "nearest, {}", context());
 }

@@ -40,7 +40,7 @@ impl Simd for Simd128 {
     // As with SSE2; not measured here.
     const FEW: u32 = 3;
 
-    #[inline(always)]
+    #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)
     }
@@ -86,6 +86,11 @@ impl Lanes<4> for F4 {
     }
 
     #[inline(always)]
+    fn fast_mul_add(self, factor: Self, other: Self) -> Self {
+        self.mul(factor).add(other)
+    }
+
+    #[inline(always)]
     fn less(self, other: Self) -> u32 {
         u32::from(i32x4_bitmask(f32x4_lt(self.0, other.0)))
     }
@@ -101,3 +106,7 @@ impl Lanes<4> for F4 {
         unsafe { v128_store(out.as_mut_ptr().cast(), self.0) }
     }
 }
+
+/// Nothing: processors with these instructions fetch ahead by themselves.
+#[inline(always)]
+pub(super) fn prefetch<T>(_what: &T) {}

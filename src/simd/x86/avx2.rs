@@ -69,6 +69,11 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn largest_of_three(self, v: F4) -> F4 {
+        v.largest_of_three()
+    }
+
+    #[inline(always)]
     fn prefetch<T>(self, what: &T) {
         super::prefetch(what);
     }
@@ -76,6 +81,7 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+        #[inline(never)]
         fn with<K: Kernel>(s: Avx2, kernel: K) -> K::Output {
             kernel.run(s)
         }
@@ -118,6 +124,12 @@ impl Lanes<8> for F8 {
     fn fast_mul_sub(self, factor: Self, other: Self) -> Self {
         // SAFETY: a value of this type proves AVX2 and FMA.
         F8(unsafe { _mm256_fmsub_ps(self.0, factor.0, other.0) })
+    }
+
+    #[inline(always)]
+    fn fast_mul_add(self, factor: Self, other: Self) -> Self {
+        // SAFETY: a value of this type proves AVX2 and FMA.
+        F8(unsafe { _mm256_fmadd_ps(self.0, factor.0, other.0) })
     }
 
     #[inline(always)]

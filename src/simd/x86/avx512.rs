@@ -59,6 +59,64 @@ width! {
     }
 
     #[inline(always)]
+    fn sort(
+        self,
+        mask: u32,
+        near: F16,
+        words: &[u32; 16],
+        near_out: &mut [MaybeUninit<f32>; 16],
+        words_out: &mut [MaybeUninit<u32>; 16],
+    ) -> u32 {
+        let (mask, count) = (mask as __mmask16, mask.count_ones());
+        let (near_out, words_out) = (near_out.as_mut_ptr(), words_out.as_mut_ptr());
+        // SAFETY: the token proves AVX-512; all tables have 16 lanes, and no more are read or written. A
+        // permutation looks at as many bits of a key as the number of a lane has.
+        unsafe {
+            let near = _mm512_maskz_compress_epi32(mask, _mm512_castps_si512(near.0));
+            let words = _mm512_loadu_si512(words.as_ptr().cast());
+            let words = _mm512_maskz_compress_epi32(mask, words);
+            let numbers = _mm512_loadu_si512(NUMBERS.as_ptr().cast());
+            let used = (0xFFFF_u32 >> (16 - count)) as __mmask16;
+            // What is found first is the nearest, which all else waits for.
+            if count <= 4 {
+                let (near, words) = (_mm512_castsi512_si128(near), _mm512_castsi512_si128(words));
+                let keys = _mm_andnot_si128(_mm_set1_epi32(3), near);
+                let keys = _mm_or_si128(keys, _mm512_castsi512_si128(numbers));
+                let used = used as __mmask8;
+                let least = _mm_mask_mov_epi32(_mm_set1_epi32(i32::MAX), used, keys);
+                let (near, words) = (_mm_castsi128_ps(near), _mm_castsi128_ps(words));
+                let least = _mm_castps_si128(_mm_permutevar_ps(words, least_of_four(least)));
+                let keys = sorted_four(_mm_mask_mov_epi32(_mm_set1_epi32(i32::MIN), used, keys));
+                _mm_storeu_ps(near_out.cast(), _mm_permutevar_ps(near, keys));
+                _mm_storeu_ps(words_out.cast(), _mm_permutevar_ps(words, keys));
+                return _mm_cvtsi128_si32(least) as u32;
+            }
+            if count <= 8 {
+                let (near, words) = (_mm512_castsi512_si256(near), _mm512_castsi512_si256(words));
+                let keys = _mm256_andnot_si256(_mm256_set1_epi32(7), near);
+                let keys = _mm256_or_si256(keys, _mm512_castsi512_si256(numbers));
+                let used = used as __mmask8;
+                let least = _mm256_mask_mov_epi32(_mm256_set1_epi32(i32::MAX), used, keys);
+                let (low, high) = (_mm256_castsi256_si128(least), _mm256_extracti128_si256::<1>(least));
+                let least = _mm256_castsi128_si256(least_of_four(_mm_min_epi32(low, high)));
+                let least = _mm256_permutevar8x32_epi32(words, least);
+                let keys = sorted_eight(_mm256_mask_mov_epi32(_mm256_set1_epi32(i32::MIN), used, keys));
+                _mm256_storeu_si256(near_out.cast(), _mm256_permutevar8x32_epi32(near, keys));
+                _mm256_storeu_si256(words_out.cast(), _mm256_permutevar8x32_epi32(words, keys));
+                return _mm_cvtsi128_si32(_mm256_castsi256_si128(least)) as u32;
+            }
+            let keys = _mm512_andnot_si512(_mm512_set1_epi32(15), near);
+            let keys = _mm512_or_si512(keys, numbers);
+            let least = _mm512_mask_reduce_min_epi32(used, keys);
+            let least = _mm512_permutexvar_epi32(_mm512_set1_epi32(least), words);
+            let keys = sorted_sixteen(_mm512_mask_mov_epi32(_mm512_set1_epi32(i32::MIN), used, keys));
+            _mm512_storeu_si512(near_out.cast(), _mm512_permutexvar_epi32(keys, near));
+            _mm512_storeu_si512(words_out.cast(), _mm512_permutexvar_epi32(keys, words));
+            _mm_cvtsi128_si32(_mm512_castsi512_si128(least)) as u32
+        }
+    }
+
+    #[inline(always)]
     fn nearest(self, mask: u32, near: F16, words: &[u32; 16]) -> (usize, u32) {
         // SAFETY: the token proves AVX-512; both tables have 16 words.
         unsafe {
@@ -84,6 +142,103 @@ width! {
             (_mm_cvtsi128_si32(keys) as usize & 3, _mm_cvtsi128_si32(word) as u32)
         }
     }
+}
+
+/// The least of four integers, in all lanes.
+///
+/// # Safety
+///
+/// The processor has SSE 4.1, as one with AVX-512 has.
+#[inline(always)]
+unsafe fn least_of_four(keys: __m128i) -> __m128i {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0x4E>(keys));
+        _mm_min_epi32(keys, _mm_shuffle_epi32::<0xB1>(keys))
+    }
+}
+
+/// One step of a bitonic network, after which the lower lanes of the compared pairs have the larger integers:
+/// `$keys` against the same in another order, the smaller ones to the lanes of `$mask`.
+macro_rules! step {
+    ($max:ident, $mask_min:ident, $keys:ident, $other:expr, $mask:literal) => {{
+        let other = $other;
+        $keys = $mask_min($max($keys, other), $mask, $keys, other);
+    }};
+}
+
+/// Integers in order, the largest first.
+///
+/// # Safety
+///
+/// The processor has AVX-512 F and VL.
+///
+/// Source: \[Bat68\], as all three.
+#[inline(always)]
+unsafe fn sorted_four(mut keys: __m128i) -> __m128i {
+    // SAFETY: the caller's promise.
+    unsafe {
+        step!(_mm_max_epi32, _mm_mask_min_epi32, keys, _mm_shuffle_epi32::<0xB1>(keys), 0b1010);
+        step!(_mm_max_epi32, _mm_mask_min_epi32, keys, _mm_shuffle_epi32::<0x1B>(keys), 0b1100);
+        step!(_mm_max_epi32, _mm_mask_min_epi32, keys, _mm_shuffle_epi32::<0xB1>(keys), 0b1010);
+    }
+    keys
+}
+
+/// The same for eight.
+///
+/// # Safety
+///
+/// As for four.
+#[inline(always)]
+unsafe fn sorted_eight(mut keys: __m256i) -> __m256i {
+    macro_rules! step8 {
+        ($other:expr, $mask:literal) => {
+            step!(_mm256_max_epi32, _mm256_mask_min_epi32, keys, $other, $mask)
+        };
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        step8!(_mm256_shuffle_epi32::<0xB1>(keys), 0xAA);
+        step8!(_mm256_shuffle_epi32::<0x1B>(keys), 0xCC);
+        step8!(_mm256_shuffle_epi32::<0xB1>(keys), 0xAA);
+        // Backwards: each half, and the halves.
+        let half = _mm256_shuffle_epi32::<0x1B>(keys);
+        step8!(_mm256_permute4x64_epi64::<0x4E>(half), 0xF0);
+        step8!(_mm256_shuffle_epi32::<0x4E>(keys), 0xCC);
+        step8!(_mm256_shuffle_epi32::<0xB1>(keys), 0xAA);
+    }
+    keys
+}
+
+/// The same for sixteen.
+///
+/// # Safety
+///
+/// As for four.
+#[inline(always)]
+unsafe fn sorted_sixteen(mut keys: __m512i) -> __m512i {
+    macro_rules! step16 {
+        ($other:expr, $mask:literal) => {
+            step!(_mm512_max_epi32, _mm512_mask_min_epi32, keys, $other, $mask)
+        };
+    }
+    // SAFETY: the caller's promise.
+    unsafe {
+        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+        step16!(_mm512_shuffle_epi32::<0x1B>(keys), 0xCCCC);
+        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+        let quarter = _mm512_shuffle_epi32::<0x1B>(keys);
+        step16!(_mm512_shuffle_i32x4::<0xB1>(quarter, quarter), 0xF0F0);
+        step16!(_mm512_shuffle_epi32::<0x4E>(keys), 0xCCCC);
+        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+        let quarter = _mm512_shuffle_epi32::<0x1B>(keys);
+        step16!(_mm512_shuffle_i32x4::<0x1B>(quarter, quarter), 0xFF00);
+        step16!(_mm512_shuffle_i32x4::<0xB1>(keys, keys), 0xF0F0);
+        step16!(_mm512_shuffle_epi32::<0x4E>(keys), 0xCCCC);
+        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+    }
+    keys
 }
 
 const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
@@ -136,6 +291,11 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn largest_of_three(self, v: F4) -> F4 {
+        v.largest_of_three()
+    }
+
+    #[inline(always)]
     fn prefetch<T>(self, what: &T) {
         super::prefetch(what);
     }
@@ -145,6 +305,7 @@ impl Simd for Avx512 {
         #[target_feature(
             enable = "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt,popcnt"
         )]
+        #[inline(never)]
         fn with<K: Kernel>(s: Avx512, kernel: K) -> K::Output {
             kernel.run(s)
         }
@@ -190,6 +351,12 @@ impl Lanes<16> for F16 {
     }
 
     #[inline(always)]
+    fn fast_mul_add(self, factor: Self, other: Self) -> Self {
+        // SAFETY: a value of this type proves AVX-512.
+        F16(unsafe { _mm512_fmadd_ps(self.0, factor.0, other.0) })
+    }
+
+    #[inline(always)]
     fn less(self, other: Self) -> u32 {
         // SAFETY: a value of this type proves AVX-512.
         unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(self.0, other.0)) }
@@ -205,15 +372,5 @@ impl Lanes<16> for F16 {
     fn store(self, out: &mut [f32; 16]) {
         // SAFETY: `out` has room for 16 floats.
         unsafe { _mm512_storeu_ps(out.as_mut_ptr(), self.0) }
-    }
-
-    #[inline(always)]
-    fn compress(self, mask: u32, out: &mut [MaybeUninit<f32>; 16]) {
-        // SAFETY: a value of this type proves AVX-512; `out` has room for 16 floats. In a register
-        // first: compressing to memory is slow on some processors.
-        unsafe {
-            let front = _mm512_maskz_compress_ps(mask as __mmask16, self.0);
-            _mm512_storeu_ps(out.as_mut_ptr().cast(), front);
-        }
     }
 }

@@ -33,7 +33,7 @@ pub(super) unsafe fn run_with<K: Kernel>(backend: Backend, kernel: K) -> K::Outp
 
 /// Asks for each cache line of `what`.
 #[inline(always)]
-fn prefetch<T>(what: &T) {
+pub(super) fn prefetch<T>(what: &T) {
     let first = core::ptr::from_ref(what).cast::<i8>();
     for line in (0..size_of::<T>()).step_by(64) {
         // SAFETY: SSE is part of x86-64, and a prefetch reads nothing.

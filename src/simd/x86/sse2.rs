@@ -26,13 +26,31 @@ impl Simd for Sse2 {
     const FEW: u32 = 3;
 
     #[inline(always)]
+    fn largest_of_three(self, v: F4) -> F4 {
+        v.largest_of_three()
+    }
+
+    #[inline(always)]
     fn prefetch<T>(self, what: &T) {
         super::prefetch(what);
     }
 
-    #[inline(always)]
+    #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)
+    }
+}
+
+impl F4 {
+    /// See [`Simd::largest_of_three`].
+    #[inline(always)]
+    pub fn largest_of_three(self) -> Self {
+        // SAFETY: SSE2 is there.
+        unsafe {
+            let next = _mm_shuffle_ps::<0b00_00_10_01>(self.0, self.0);
+            let last = _mm_shuffle_ps::<0b00_01_00_10>(self.0, self.0);
+            F4(_mm_max_ps(_mm_max_ps(self.0, next), last))
+        }
     }
 }
 
@@ -68,6 +86,11 @@ impl Lanes<4> for F4 {
     #[inline(always)]
     fn fast_mul_sub(self, factor: Self, other: Self) -> Self {
         self.mul(factor).sub(other)
+    }
+
+    #[inline(always)]
+    fn fast_mul_add(self, factor: Self, other: Self) -> Self {
+        self.mul(factor).add(other)
     }
 
     #[inline(always)]
