@@ -72,6 +72,37 @@ pub(crate) fn bytes_of<T: Plain>(value: &T) -> &[u8] {
     unsafe { core::slice::from_raw_parts(core::ptr::from_ref(value).cast(), size_of::<T>()) }
 }
 
+/// Has the system put finished bytes into large pages, where it can: rays visit them here and there, and with small
+/// pages many visits would wait for the table of pages.
+#[cfg(all(feature = "std", target_os = "linux", target_arch = "x86_64", not(miri)))]
+fn use_large_pages(bytes: &[u8]) {
+    use core::ffi::{c_int, c_void};
+    unsafe extern "C" {
+        fn madvise(start: *mut c_void, size: usize, advice: c_int) -> c_int;
+    }
+    const LARGE: usize = 2 << 20;
+    const MADV_HUGEPAGE: c_int = 14;
+    const MADV_COLLAPSE: c_int = 25;
+    let start = bytes.as_ptr();
+    let ahead = start.addr().wrapping_neg() % LARGE;
+    let size = bytes.len().saturating_sub(ahead) / LARGE * LARGE;
+    if size == 0 {
+        return;
+    }
+    let start = start.wrapping_add(ahead).cast_mut().cast();
+    for advice in [MADV_HUGEPAGE, MADV_COLLAPSE] {
+        // SAFETY: whole pages of one allocation, whose bytes stay as they are. Systems that do not know the advice
+        // refuse it, which does not matter.
+        unsafe { madvise(start, size, advice) };
+    }
+}
+
+#[cfg(all(
+    feature = "alloc",
+    not(all(feature = "std", target_os = "linux", target_arch = "x86_64", not(miri)))
+))]
+fn use_large_pages(_bytes: &[u8]) {}
+
 /// Zero bytes from the global allocator, aligned as blocks are.
 ///
 /// The allocator is asked for no alignment, so that it can give back the end of a large piece without
@@ -111,6 +142,7 @@ impl AlignedMemory {
         if self.start != start {
             self.memory.copy_within(start..start + self.size, self.start);
         }
+        use_large_pages(&self.memory);
         self
     }
 
