@@ -24,7 +24,7 @@ pub(crate) use compact::{build, needs};
 pub(crate) use stack::Columns;
 pub(crate) use traverse::traverse;
 pub(crate) use validate::{bundles_are_sound, tree_is_sound};
-pub(crate) use wide::{Walk, traverse_wide};
+pub(crate) use wide::{ENOUGH_ROOM, Walk, traverse_wide};
 pub(crate) use wide_build::{build_wide, needs_wide};
 
 /// No path from the root is longer, whatever the scene, so a stack of this many entries suffices.

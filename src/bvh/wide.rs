@@ -19,7 +19,7 @@ pub(crate) struct Walk<'m, const ROOM: usize> {
 }
 
 /// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry.
-const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 2 * 16;
+pub(crate) const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 2 * 16;
 
 impl<'m, const ROOM: usize> Walk<'m, ROOM> {
     /// At the root.
@@ -51,9 +51,7 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         bundle: &Bundle<W>,
         boxes: &impl WideBoxes<S, W>,
         t_bounds: S::V,
-        query: &mut Q,
     ) -> bool {
-        query.watch().step();
         let (mask, near) = if Q::ANY_BOXES {
             boxes.entered::<true>(&bundle.walls, t_bounds)
         } else {
@@ -87,12 +85,18 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         if leaves.intersect_whole(s, self.at.leaf_block(), ray, query) {
             return true;
         }
-        if Q::ORDERED && query.t_bound() < self.t_bound {
-            self.t_bound = query.t_bound();
-            self.stack.cull(s, self.t_bound);
+        self.leave::<S, Q>(s, query.t_bound());
+        false
+    }
+
+    /// Goes on from a leaf; nothing beyond `t_bound` is of interest any more.
+    #[inline(always)]
+    pub fn leave<S: Simd, Q: Query>(&mut self, s: S, t_bound: f32) {
+        if Q::ORDERED && t_bound < self.t_bound {
+            self.t_bound = t_bound;
+            self.stack.cull(s, t_bound);
         }
         self.at = self.stack.pop();
-        false
     }
 
     /// Nothing beyond this `t` of the frame is visited any more.
@@ -119,7 +123,8 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
         let t_bounds = Width::<W>::splat(s, walk.t_bound());
         while !walk.at().is_leaf() {
             let Some(bundle) = bundles.get(walk.at().bundle_number()) else { return false };
-            if !walk.enter(s, bundle, &boxes, t_bounds, query) {
+            query.watch().step();
+            if !walk.enter::<S, Q, W>(s, bundle, &boxes, t_bounds) {
                 return false;
             }
         }

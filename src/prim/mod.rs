@@ -14,6 +14,7 @@ use crate::block::Block;
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock,
 };
+use crate::math::Aabb;
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Triangles};
@@ -88,6 +89,14 @@ impl Leaves<'_> {
         query: &mut Q,
     ) -> bool {
         self.intersect_block(s, kind, number, u32::MAX, ray, query)
+    }
+
+    /// The box of a block; all of space for one that has none.
+    #[inline(always)]
+    pub fn aabb(&self, (kind, number): (u32, usize)) -> Aabb {
+        let everywhere = Aabb { lower: [f32::MIN; 3], upper: [f32::MAX; 3] };
+        let block = self.triangle_blocks.get(number).filter(|_| kind == KIND_TRIANGLES);
+        block.map_or(everywhere, |block| block.aabb)
     }
 
     /// Has a block fetched that will be visited soon.

@@ -3,9 +3,11 @@
 #[cfg(test)]
 mod bounds;
 mod frame;
+mod packet;
 mod slab;
 
 pub(crate) use frame::PreparedRay;
+pub(crate) use packet::{GROUPS, PACKET, SlabPacket};
 pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".
@@ -43,7 +45,7 @@ impl Ray {
 
     /// Its halves, each a vector on most machines.
     #[inline(always)]
-    fn rows(&self) -> [[f32; 4]; 2] {
+    pub(crate) fn rows(&self) -> [[f32; 4]; 2] {
         let Ray { origin: [x, y, z], t_min, direction: [dx, dy, dz], t_max } = *self;
         [[x, y, z, t_min], [dx, dy, dz, t_max]]
     }

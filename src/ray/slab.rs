@@ -37,9 +37,9 @@ pub(crate) struct NarrowSlab {
     pub(super) reciprocal: [f32; 4],
     pub(super) near_shift: [f32; 4],
     pub(super) far_shift: [f32; 4],
-    t_min: f32,
+    pub(super) t_min: f32,
     /// Whether the ray runs from the upper wall to the lower one, for each axis.
-    backwards: [bool; 3],
+    pub(super) backwards: [bool; 3],
 }
 
 /// From given numbers to the frame's: powers of two.

@@ -1,0 +1,124 @@
+//! Many rays through one block: together where they are alike, and several in flight where they are not.
+
+mod flights;
+mod packet;
+
+use crate::block::bundle::Bundle;
+use crate::block::{Block, Bundles};
+use crate::query::Query;
+use crate::ray::{PACKET, Ray};
+use crate::simd::{self, Kernel, Simd};
+use crate::trace::{Question, ask};
+
+/// Answers `question` for each ray, by `keep` into its answer; stops at the end of the shorter slice.
+pub(crate) fn ask_all<Q: Question + Copy, A>(
+    block: &Block,
+    rays: &[Ray],
+    answers: &mut [A],
+    question: Q,
+    keep: fn(Q::Answer) -> A,
+) {
+    // Only for the layout that is chosen automatically: others would be more copies of the code.
+    match block.bundles {
+        Bundles::Sixteen(bundles) if rays.len() > 1 => {
+            simd::dispatch(Batch { block, bundles, rays, answers, question, keep });
+        }
+        _ => ask_each(block, rays, answers, question, keep),
+    }
+}
+
+/// Blocks of fewer bytes mostly are in the cache, and single calls then wait for nothing that others could use: with
+/// closest hits, and with any hits, which are over sooner.
+const NEAR: [usize; 2] = [2 << 20, 16 << 20];
+
+/// The same, one ray after the other.
+pub(crate) fn ask_each<Q: Question + Copy, A>(
+    block: &Block,
+    rays: &[Ray],
+    answers: &mut [A],
+    question: Q,
+    keep: fn(Q::Answer) -> A,
+) {
+    for (ray, answer) in rays.iter().zip(answers) {
+        *answer = keep(ask(block, ray, question));
+    }
+}
+
+/// Rays that ask the same question, and where their answers go.
+struct Batch<'a, 'm, Q: Question, A> {
+    block: &'a Block<'m>,
+    bundles: &'m [Bundle<16>],
+    rays: &'a [Ray],
+    answers: &'a mut [A],
+    question: Q,
+    keep: fn(Q::Answer) -> A,
+}
+
+impl<Q: Question + Copy, A> Kernel for Batch<'_, '_, Q, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(mut self, s: S) {
+        if !S::FLIES {
+            let Batch { block, rays, answers, question, keep, .. } = self;
+            return ask_each(block, rays, answers, question, keep);
+        }
+        let count = self.rays.len().min(self.answers.len());
+        let near = self.block.bytes.len() < NEAR[usize::from(!Q::Query::ORDERED)];
+        let mut first = 0;
+        while first < count {
+            let (alike, end) = self.stretch(s, first, count);
+            let part = self.part(first, end);
+            if alike {
+                part.trace_together(s);
+            } else if near {
+                ask_each(part.block, part.rays, part.answers, part.question, part.keep);
+            } else {
+                part.fly(s);
+            }
+            first = end;
+        }
+    }
+}
+
+impl<'m, Q: Question + Copy, A> Batch<'_, 'm, Q, A> {
+    /// Where the packet that begins with the ray `first` ends, or else where the next one begins.
+    #[inline(always)]
+    fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (bool, usize) {
+        let mut end = first;
+        while end < count {
+            let next = count.min(end + PACKET);
+            if packet::are_alike(s, &self.rays[end..next], self.block.header.reach) {
+                return if end == first { (true, next) } else { (false, end) };
+            }
+            end = next;
+        }
+        (false, end)
+    }
+
+    /// The rays from `first` to `end`.
+    #[inline(always)]
+    fn part(&mut self, first: usize, end: usize) -> Batch<'_, 'm, Q, A> {
+        let Batch { block, bundles, rays, question, keep, .. } = *self;
+        let (rays, answers) = (&rays[first..end], &mut self.answers[first..end]);
+        Batch { block, bundles, rays, answers, question, keep }
+    }
+
+    /// Writes the answer of a ray.
+    #[inline(always)]
+    fn write(&mut self, number: usize, answer: Q::Answer) {
+        if let Some(place) = self.answers.get_mut(number) {
+            *place = (self.keep)(answer);
+        }
+    }
+
+    /// Answers for a ray at the ends of the floats, or one that had no room.
+    #[cold]
+    #[inline(never)]
+    fn answer_alone(&mut self, number: usize) {
+        if let Some(ray) = self.rays.get(number) {
+            let answer = ask(self.block, ray, self.question);
+            self.write(number, answer);
+        }
+    }
+}

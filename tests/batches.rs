@@ -1,0 +1,168 @@
+//! Batches give the bits of single calls, whichever way they go: together, in flight, or one by one.
+
+#![allow(missing_docs)]
+
+mod common;
+
+use common::{All, bits};
+use raykern::{
+    Accel, BuildOptions, Facing, Hit, Mesh, OwnedAccel, Precision, QueryOptions, Ray, Scene,
+};
+use raykern_harness::make;
+use raykern_harness::model::{Model, TriangleMesh};
+use raykern_harness::rays::{Family, RayMaker};
+
+const ALL: QueryOptions =
+    QueryOptions { precision: Precision::Exact, mask: 0, facing: Facing::Both, skip: None };
+
+/// Batches of these rays give the bits of single calls, whatever is asked; returns how many hit.
+fn same_in_a_batch(name: &str, accel: &Accel, rays: &[Ray]) -> usize {
+    let watertight = QueryOptions { precision: Precision::Watertight, ..ALL };
+    let fronts = QueryOptions { facing: Facing::Front, ..ALL };
+    let mut hit_count = 0;
+    for options in [ALL, watertight, fronts] {
+        // What stands there before shows what is not written.
+        let mut hits = vec![Hit { t: -7.0, ..Hit::MISS }; rays.len()];
+        let mut occluded = vec![true; rays.len()];
+        accel.intersect_batch_with(rays, &options, &mut hits);
+        accel.occluded_batch_with(rays, &options, &mut occluded);
+        for ((ray, hit), occluded) in rays.iter().zip(hits).zip(occluded) {
+            let single = accel.intersect_with(ray, &options);
+            let expected = bits(Some(single.unwrap_or(Hit::MISS)));
+            assert_eq!(bits(Some(hit)), expected, "{name} {ray:?}");
+            assert_eq!(occluded, accel.occluded_with(ray, &options), "{name} {ray:?}");
+            hit_count += usize::from(single.is_some());
+        }
+    }
+    hit_count
+}
+
+fn same_in_all(model: &Model, rays: &[Ray]) -> usize {
+    let all = All::of(model);
+    all.accels().iter().map(|(name, accel)| same_in_a_batch(name, accel, rays)).sum()
+}
+
+/// A mesh of more bytes than are near, with others in front of it.
+fn far(meshes: &[TriangleMesh]) -> OwnedAccel {
+    let mut large = make::sphere(600_000);
+    large.vertices.iter_mut().for_each(|v| v[0] += 100.0);
+    let meshes: Vec<Mesh> = meshes
+        .iter()
+        .chain([&large])
+        .map(|mesh| Mesh::indexed(&mesh.vertices, &mesh.indices))
+        .collect();
+    let built = OwnedAccel::bvh(&Scene::new(&meshes, &[]), &BuildOptions::default());
+    let built = built.expect("a structure");
+    assert!(built.accel().block().len() > 16 << 20);
+    built
+}
+
+/// Replaces some by rays that hit nothing by definition, and some by rays too far out for boxes in `f32`.
+fn with_odd_ones(mut rays: Vec<Ray>) -> Vec<Ray> {
+    for (i, ray) in rays.iter_mut().enumerate() {
+        match i % 9 {
+            2 => ray.direction = [0.0; 3],
+            5 => ray.origin[0] = f32::NAN,
+            7 => ray.origin[1] = 3e38,
+            _ => (),
+        }
+    }
+    rays
+}
+
+#[test]
+fn incoherent_rays() {
+    let model: Model = make::blob(1_500, 4).into();
+    let rays = with_odd_ones(RayMaker::new(&model, 3).many(Family::Random, 1_000));
+    for count in [0, 1, 2, 11, 12, 13, 40, 1_000] {
+        same_in_all(&model, &rays[..count]);
+    }
+    let (near, far) = (make::blob(1_500, 4), far(&[make::blob(1_500, 4)]));
+    let rays = with_odd_ones(RayMaker::new(&near.into(), 3).many(Family::Random, 1_000));
+    for count in [2, 11, 12, 13, 40, 1_000] {
+        let hits = same_in_a_batch("far", &far.accel(), &rays[..count]);
+        assert!(count < 1_000 || hits > 100, "{hits}");
+    }
+}
+
+#[test]
+fn rays_with_much_to_come_back_to() {
+    // Each triangle a little larger and further away than the one before, so that a ray from the smallest end leaves
+    // the others behind at every level of the tree.
+    let mut mesh = TriangleMesh { vertices: Vec::new(), indices: Vec::new() };
+    for i in 0..1_500 {
+        let (size, first) = (1.03f32.powi(i - 750), 3 * i as u32);
+        mesh.vertices.extend([
+            [-size, -size, size],
+            [2.0 * size, -size, size],
+            [-size, 2.0 * size, size],
+        ]);
+        mesh.indices.push([first, first + 1, first + 2]);
+    }
+    // By turns to either side, so that no packet holds them.
+    let rays: Vec<Ray> = (0..50)
+        .map(|i| {
+            let side = if i % 2 == 0 { 0.001 } else { -0.001 };
+            Ray::new([0.0; 3], [side * i as f32, 0.002 * i as f32, 1.0])
+        })
+        .collect();
+    assert!(same_in_a_batch("far", &far(&[mesh.clone()]).accel(), &rays) > 40);
+    assert!(same_in_all(&mesh.into(), &rays) > 100);
+}
+
+/// Rays through the pixels of `side` by `side`, tile by tile, from a point to a square around another.
+fn camera(side: usize, from: [f32; 3], to: [f32; 3], half: f32) -> Vec<Ray> {
+    let tiles = side / 8;
+    let pixels = (0..side * side).map(|i| {
+        let (tile, within) = (i / 64, i % 64);
+        (tile % tiles * 8 + within % 8, tile / tiles * 8 + within / 8)
+    });
+    let at = |i: usize| (2.0 * i as f32 / side as f32 - 1.0) * half;
+    let way = |k: usize| to[k] - from[k];
+    pixels.map(|(x, y)| Ray::new(from, [way(0) + at(x), way(1) + at(y), way(2)])).collect()
+}
+
+#[test]
+fn rays_of_a_camera() {
+    let blob: Model = make::blob(1_500, 4).into();
+    let mixed = Model {
+        sphere_sets: vec![
+            (0..40)
+                .map(|i| [0.1 * (i % 7) as f32 - 0.3, 0.1 * (i % 5) as f32 - 0.2, 1.5, 0.06])
+                .collect(),
+        ],
+        ..blob.clone()
+    };
+    // To either side of all three axes, so that walls are passed in every order.
+    for from in [[3.0, 2.5, 4.0], [-3.0, 2.5, -4.0], [3.0, -2.5, 4.0], [0.1, 0.2, 5.0]] {
+        let rays = camera(32, from, [0.0; 3], 1.5);
+        for model in [&blob, &mixed] {
+            let hits = same_in_all(model, &rays);
+            assert!(hits > 1_000, "{hits}");
+        }
+        // Packets that are not full, and packets with holes.
+        for count in [7, 8, 9, 63, 64, 65, 100] {
+            same_in_all(&mixed, &rays[..count]);
+        }
+        same_in_all(&mixed, &with_odd_ones(rays));
+    }
+}
+
+#[test]
+fn rays_to_a_light() {
+    let model: Model = make::blob(3_000, 5).into();
+    let all = All::of(&model);
+    let (_, accel) = all.accels()[0];
+    let light = [4.0, 5.0, 6.0];
+    let shadow = |ray: &Ray| {
+        let t = accel.intersect(ray)?.t;
+        let at = |k: usize| ray.origin[k] + ray.direction[k] * t;
+        let way = |k: usize| light[k] - at(k);
+        Some(Ray::new([at(0), at(1), at(2)], [way(0), way(1), way(2)]).with_limits(1e-4, 1.0))
+    };
+    let rays: Vec<Ray> =
+        camera(64, [1.0, 1.5, 4.0], [0.0; 3], 0.7).iter().filter_map(shadow).collect();
+    assert!(rays.len() > 1_000);
+    let hits = same_in_all(&model, &rays);
+    assert!(hits > 500, "{hits}");
+}
