@@ -70,9 +70,9 @@ pub(super) fn halves<const N: usize, const HALF: usize>(lanes: &[f32; N]) -> [&[
     unsafe { [&*lanes.as_ptr().cast(), &*lanes.as_ptr().add(HALF).cast()] }
 }
 
-/// A width of two narrower vectors.
+/// A width of two narrower vectors, and what it does otherwise than the trait says.
 macro_rules! doubled {
-    ($backend:ident $n:literal of $half:literal $v:ty) => {
+    ($backend:ident $n:literal of $half:literal $v:ty $(, $($other:item)*)?) => {
         impl Width<$n> for $backend {
             type V = Two<$v>;
 
@@ -87,6 +87,8 @@ macro_rules! doubled {
                 let [low, high] = halves::<$n, $half>(lanes);
                 Two(self.load(low), self.load(high))
             }
+
+            $($($other)*)?
         }
     };
 }

@@ -6,10 +6,12 @@
 )]
 
 use core::arch::x86_64::*;
+use core::mem::MaybeUninit;
 
+use super::sort;
 use super::sse2::F4;
 use crate::simd::doubled::{Two, halves};
-use crate::simd::{Kernel, Lanes, Simd, Width};
+use crate::simd::{Kernel, Lanes, Simd, Width, scalar};
 
 /// Proof that this processor runs AVX2 and FMA.
 #[derive(Clone, Copy)]
@@ -29,8 +31,98 @@ impl Avx2 {
 pub(super) struct F8(pub(super) __m256);
 
 width!(Avx2 4 F4 _mm_set1_ps _mm_loadu_ps);
-width!(Avx2 8 F8 _mm256_set1_ps _mm256_loadu_ps);
-doubled!(Avx2 16 of 8 F8);
+width! {
+    Avx2 8 F8 _mm256_set1_ps _mm256_loadu_ps
+
+    #[inline(always)]
+    fn compress_words(self, mask: u32, words: &[u32; 8], out: &mut [MaybeUninit<u32>; 8]) {
+        // SAFETY: the token proves AVX2; both arrays have eight words.
+        unsafe {
+            let all = _mm256_loadu_si256(words.as_ptr().cast());
+            let front = _mm256_permutevar8x32_epi32(all, sort::numbers_of(mask));
+            _mm256_storeu_si256(out.as_mut_ptr().cast(), front);
+        }
+    }
+
+    #[inline(always)]
+    fn sort(
+        self,
+        mask: u32,
+        near: F8,
+        words: &[u32; 8],
+        near_out: &mut [MaybeUninit<f32>; 8],
+        words_out: &mut [MaybeUninit<u32>; 8],
+    ) -> u32 {
+        near.sort(mask, words, near_out, words_out)
+    }
+}
+
+doubled! {
+    Avx2 16 of 8 F8,
+
+    #[inline(always)]
+    fn compress_words(self, mask: u32, words: &[u32; 16], out: &mut [MaybeUninit<u32>; 16]) {
+        let (low, high) = (mask & 0xFF, mask >> 8 & 0xFF);
+        // SAFETY: the token proves AVX2; both arrays have 16 words, and a half has eight at most.
+        unsafe {
+            let (words, out) = (words.as_ptr(), out.as_mut_ptr());
+            let lower = _mm256_loadu_si256(words.cast());
+            let upper = _mm256_loadu_si256(words.add(8).cast());
+            let lower = _mm256_permutevar8x32_epi32(lower, sort::numbers_of(low));
+            let upper = _mm256_permutevar8x32_epi32(upper, sort::numbers_of(high));
+            _mm256_storeu_si256(out.cast(), lower);
+            _mm256_storeu_si256(out.add(low.count_ones() as usize).cast(), upper);
+        }
+    }
+
+    #[inline(always)]
+    fn sort(
+        self,
+        mask: u32,
+        near: Two<F8>,
+        words: &[u32; 16],
+        near_out: &mut [MaybeUninit<f32>; 16],
+        words_out: &mut [MaybeUninit<u32>; 16],
+    ) -> u32 {
+        let count = mask.count_ones();
+        if count > 8 {
+            let mut lanes = [0.0; 16];
+            near.store(&mut lanes);
+            return scalar::sort(mask, &lanes, words, near_out, words_out);
+        }
+        // SAFETY: the token proves AVX2; all tables have 16 lanes.
+        unsafe {
+            let numbers = sort::numbers_of(mask);
+            let lower = _mm256_loadu_ps(words.as_ptr().cast());
+            let upper = _mm256_loadu_ps(words.as_ptr().add(8).cast());
+            let words = _mm256_castps_si256(pick(Two(F8(lower), F8(upper)), numbers).0);
+            let near = _mm256_castps_si256(pick(near, numbers).0);
+            sort::sort(near, words, count, near_out.as_mut_ptr(), words_out.as_mut_ptr())
+        }
+    }
+}
+
+impl F8 {
+    /// See [`Width::sort`].
+    #[inline(always)]
+    pub fn sort(
+        self,
+        mask: u32,
+        words: &[u32; 8],
+        near_out: &mut [MaybeUninit<f32>; 8],
+        words_out: &mut [MaybeUninit<u32>; 8],
+    ) -> u32 {
+        // SAFETY: a value of this type proves AVX2; all tables have eight lanes.
+        unsafe {
+            let numbers = sort::numbers_of(mask & 0xFF);
+            let near = _mm256_castps_si256(_mm256_permutevar8x32_ps(self.0, numbers));
+            let words = _mm256_loadu_si256(words.as_ptr().cast());
+            let words = _mm256_permutevar8x32_epi32(words, numbers);
+            let count = mask.count_ones();
+            sort::sort(near, words, count, near_out.as_mut_ptr(), words_out.as_mut_ptr())
+        }
+    }
+}
 
 /// Of 16 lanes the eight with these numbers, in the four lowest bits.
 ///

@@ -9,6 +9,7 @@ use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
 use super::avx2::F8;
+use super::sort::{self, least_of_four, sorted_four};
 use super::sse2::F4;
 use crate::simd::{Kernel, Lanes, Simd, Width};
 
@@ -33,6 +34,18 @@ width!(Avx512 4 F4 _mm_set1_ps _mm_loadu_ps);
 
 width! {
     Avx512 8 F8 _mm256_set1_ps _mm256_loadu_ps
+
+    #[inline(always)]
+    fn sort(
+        self,
+        mask: u32,
+        near: F8,
+        words: &[u32; 8],
+        near_out: &mut [MaybeUninit<f32>; 8],
+        words_out: &mut [MaybeUninit<u32>; 8],
+    ) -> u32 {
+        near.sort(mask, words, near_out, words_out)
+    }
 
     #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; 8], out: &mut [MaybeUninit<u32>; 8]) {
@@ -93,17 +106,7 @@ width! {
             }
             if count <= 8 {
                 let (near, words) = (_mm512_castsi512_si256(near), _mm512_castsi512_si256(words));
-                let keys = _mm256_andnot_si256(_mm256_set1_epi32(7), near);
-                let keys = _mm256_or_si256(keys, _mm512_castsi512_si256(numbers));
-                let used = used as __mmask8;
-                let least = _mm256_mask_mov_epi32(_mm256_set1_epi32(i32::MAX), used, keys);
-                let (low, high) = (_mm256_castsi256_si128(least), _mm256_extracti128_si256::<1>(least));
-                let least = _mm256_castsi128_si256(least_of_four(_mm_min_epi32(low, high)));
-                let least = _mm256_permutevar8x32_epi32(words, least);
-                let keys = sorted_eight(_mm256_mask_mov_epi32(_mm256_set1_epi32(i32::MIN), used, keys));
-                _mm256_storeu_si256(near_out.cast(), _mm256_permutevar8x32_epi32(near, keys));
-                _mm256_storeu_si256(words_out.cast(), _mm256_permutevar8x32_epi32(words, keys));
-                return _mm_cvtsi128_si32(_mm256_castsi256_si128(least)) as u32;
+                return sort::sort(near, words, count, near_out, words_out);
             }
             let keys = _mm512_andnot_si512(_mm512_set1_epi32(15), near);
             let keys = _mm512_or_si512(keys, numbers);
@@ -144,99 +147,33 @@ width! {
     }
 }
 
-/// The least of four integers, in all lanes.
+/// Integers in order, the largest first, as for [four](sorted_four).
 ///
 /// # Safety
 ///
-/// The processor has SSE 4.1, as one with AVX-512 has.
-#[inline(always)]
-unsafe fn least_of_four(keys: __m128i) -> __m128i {
-    // SAFETY: the caller's promise.
-    unsafe {
-        let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0x4E>(keys));
-        _mm_min_epi32(keys, _mm_shuffle_epi32::<0xB1>(keys))
-    }
-}
-
-/// One step of a bitonic network, after which the lower lanes of the compared pairs have the larger integers:
-/// `$keys` against the same in another order, the smaller ones to the lanes of `$mask`.
-macro_rules! step {
-    ($max:ident, $mask_min:ident, $keys:ident, $other:expr, $mask:literal) => {{
-        let other = $other;
-        $keys = $mask_min($max($keys, other), $mask, $keys, other);
-    }};
-}
-
-/// Integers in order, the largest first.
-///
-/// # Safety
-///
-/// The processor has AVX-512 F and VL.
-///
-/// Source: \[Bat68\], as all three.
-#[inline(always)]
-unsafe fn sorted_four(mut keys: __m128i) -> __m128i {
-    // SAFETY: the caller's promise.
-    unsafe {
-        step!(_mm_max_epi32, _mm_mask_min_epi32, keys, _mm_shuffle_epi32::<0xB1>(keys), 0b1010);
-        step!(_mm_max_epi32, _mm_mask_min_epi32, keys, _mm_shuffle_epi32::<0x1B>(keys), 0b1100);
-        step!(_mm_max_epi32, _mm_mask_min_epi32, keys, _mm_shuffle_epi32::<0xB1>(keys), 0b1010);
-    }
-    keys
-}
-
-/// The same for eight.
-///
-/// # Safety
-///
-/// As for four.
-#[inline(always)]
-unsafe fn sorted_eight(mut keys: __m256i) -> __m256i {
-    macro_rules! step8 {
-        ($other:expr, $mask:literal) => {
-            step!(_mm256_max_epi32, _mm256_mask_min_epi32, keys, $other, $mask)
-        };
-    }
-    // SAFETY: the caller's promise.
-    unsafe {
-        step8!(_mm256_shuffle_epi32::<0xB1>(keys), 0xAA);
-        step8!(_mm256_shuffle_epi32::<0x1B>(keys), 0xCC);
-        step8!(_mm256_shuffle_epi32::<0xB1>(keys), 0xAA);
-        // Backwards: each half, and the halves.
-        let half = _mm256_shuffle_epi32::<0x1B>(keys);
-        step8!(_mm256_permute4x64_epi64::<0x4E>(half), 0xF0);
-        step8!(_mm256_shuffle_epi32::<0x4E>(keys), 0xCC);
-        step8!(_mm256_shuffle_epi32::<0xB1>(keys), 0xAA);
-    }
-    keys
-}
-
-/// The same for sixteen.
-///
-/// # Safety
-///
-/// As for four.
+/// The processor has AVX-512 F.
 #[inline(always)]
 unsafe fn sorted_sixteen(mut keys: __m512i) -> __m512i {
-    macro_rules! step16 {
-        ($other:expr, $mask:literal) => {
-            step!(_mm512_max_epi32, _mm512_mask_min_epi32, keys, $other, $mask)
-        };
+    macro_rules! step {
+        ($other:expr, $mask:literal) => {{
+            let other = $other;
+            keys = _mm512_mask_min_epi32(_mm512_max_epi32(keys, other), $mask, keys, other);
+        }};
     }
     // SAFETY: the caller's promise.
     unsafe {
-        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
-        step16!(_mm512_shuffle_epi32::<0x1B>(keys), 0xCCCC);
-        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+        step!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+        step!(_mm512_shuffle_epi32::<0x1B>(keys), 0xCCCC);
+        step!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
         let quarter = _mm512_shuffle_epi32::<0x1B>(keys);
-        step16!(_mm512_shuffle_i32x4::<0xB1>(quarter, quarter), 0xF0F0);
-        step16!(_mm512_shuffle_epi32::<0x4E>(keys), 0xCCCC);
-        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+        step!(_mm512_shuffle_i32x4::<0xB1>(quarter, quarter), 0xF0F0);
+        step!(_mm512_shuffle_epi32::<0x4E>(keys), 0xCCCC);
+        step!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
         let quarter = _mm512_shuffle_epi32::<0x1B>(keys);
-        step16!(_mm512_shuffle_i32x4::<0x1B>(quarter, quarter), 0xFF00);
-        step16!(_mm512_shuffle_i32x4::<0xB1>(keys, keys), 0xF0F0);
-        step16!(_mm512_shuffle_epi32::<0x4E>(keys), 0xCCCC);
-        step16!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
+        step!(_mm512_shuffle_i32x4::<0x1B>(quarter, quarter), 0xFF00);
+        step!(_mm512_shuffle_i32x4::<0xB1>(keys, keys), 0xF0F0);
+        step!(_mm512_shuffle_epi32::<0x4E>(keys), 0xCCCC);
+        step!(_mm512_shuffle_epi32::<0xB1>(keys), 0xAAAA);
     }
     keys
 }

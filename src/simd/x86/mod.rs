@@ -3,6 +3,7 @@
 mod avx2;
 mod avx512;
 mod detect;
+mod sort;
 mod sse2;
 
 pub(super) use detect::detect;
