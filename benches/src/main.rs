@@ -28,6 +28,9 @@ use crate::watch::Watch;
 fn main() -> Result<()> {
     let options = Options::parse();
     report::machine(watch::stay_on(options.core), &options);
+    if let Some(backend) = options.backend {
+        println!("ours with {:?}", backend.force());
+    }
     let mut watch = Watch::new();
     if !watch.counts_events() {
         println!("no processor events: this machine does not count them\n");

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use raykern::Layout;
+use raykern::{Backend, Layout};
 
 use crate::rays::Kind;
 
@@ -23,6 +23,9 @@ pub struct Options {
     /// A layout of our BVH: automatic, compact, wide4, wide8 or wide16; may be repeated.
     #[arg(long = "layout", value_name = "NAME", value_parser = parse_layout)]
     pub layouts: Vec<(String, Layout)>,
+    /// The instructions that ours may use at most: scalar, bits128, avx2 or avx512.
+    #[arg(long, value_name = "NAME", value_parser = parse_backend)]
+    pub backend: Option<Backend>,
     /// Rays of each kind.
     #[arg(long, value_name = "N")]
     pub rays: Option<usize>,
@@ -61,6 +64,16 @@ fn parse_layout(name: &str) -> Result<(String, Layout), String> {
         let known: Vec<_> = LAYOUTS.iter().map(|(known, _)| *known).collect();
         format!("expected one of {}", known.join(", "))
     })
+}
+
+fn parse_backend(name: &str) -> Result<Backend, String> {
+    match name {
+        "scalar" => Ok(Backend::Scalar),
+        "bits128" => Ok(Backend::Bits128),
+        "avx2" => Ok(Backend::Avx2),
+        "avx512" => Ok(Backend::Avx512),
+        _ => Err("expected one of scalar, bits128, avx2, avx512".to_string()),
+    }
 }
 
 impl Options {
