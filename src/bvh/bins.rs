@@ -22,8 +22,8 @@ impl Effort {
     pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false };
     pub const BEST: Effort = Effort { bins: BINS, samples: ALL, one_axis: false };
 
-    /// The same for these refs: a sample says nothing of a few that are much larger than the others, such as the walls
-    /// of a building.
+    /// The same for these refs, or the best where few are much larger than the others, such as the walls of a building: a
+    /// sample says nothing of them, and where they are parted matters.
     pub fn for_refs(self, refs: &[PrimRef], areas: Areas) -> Effort {
         let (mut sum, mut squares) = (0.0, 0.0);
         for r in refs {
@@ -33,14 +33,14 @@ impl Effort {
         }
         // 1 where all are alike, about `n / k` where `k` have most of the area.
         let uneven = squares * refs.len() as f64 > UNEVEN * sum * sum;
-        if uneven && !self.one_axis { Effort { samples: ALL, ..self } } else { self }
+        if uneven && !self.one_axis { Self::BEST } else { self }
     }
 }
 
 /// As many samples as there are refs.
 const ALL: usize = 1 << 29;
 
-/// Above this the areas of refs are so uneven that none is left out.
+/// Above this the areas of refs are uneven.
 const UNEVEN: f64 = 64.0;
 
 /// How centres fall into bins.
