@@ -19,7 +19,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("interval", &["exact", "math"]),
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
-    ("query", &["block", "exact", "interval", "ray", "sieve"]),
+    ("query", &["block", "exact", "interval", "ray", "sieve", "simd"]),
     ("prim", &["block", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"]),
     ("list", &["block", "error", "prim", "scene"]),
     ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd"]),
@@ -27,7 +27,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         "bvh",
         &["block", "caller", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"],
     ),
-    ("surface", &["interval", "math", "ray"]),
+    ("surface", &["exact", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "prim", "query", "ray", "simd", "trace"]),
     (
