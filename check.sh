@@ -80,7 +80,7 @@ step_header() {
 # The C programs once more, with address and undefined-behaviour sanitizers.
 step_c() { RAYKERN_SANITIZE=1 cargo test --features capi --test c_programs; }
 
-# Each fuzz target for 20 seconds, from nothing; fuzz/README.md says how to run them for longer.
+# Each fuzz target for ten seconds, from nothing; fuzz/README.md says how to run them for longer.
 step_fuzz() (
     cd fuzz
     export RUSTC_BOOTSTRAP=1
@@ -89,7 +89,7 @@ step_fuzz() (
     for target in mesh ray block; do
         echo "-- $target"
         if ! "target/x86_64-unknown-linux-gnu/release/$target" "-artifact_prefix=$findings/" \
-            -max_total_time=20 -max_len=2048 -len_control=0 -timeout=10 >"$findings/log" 2>&1; then
+            -max_total_time=10 -max_len=2048 -len_control=0 -timeout=10 >"$findings/log" 2>&1; then
             grep -a -A2 panicked "$findings/log" || tail -n 40 "$findings/log"
             echo "a finding: fuzz/README.md, with the input in $findings" >&2
             exit 1
