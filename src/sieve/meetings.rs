@@ -41,6 +41,12 @@ impl Middle {
         [(low - self.depth) - slack, (high - self.depth) + slack]
     }
 
+    /// Whether all of the box is beyond a window: where areas are in doubt, as from very far away, this is not.
+    #[inline(always)]
+    pub fn is_beyond(&self, [low, high]: [f32; 2]) -> bool {
+        (low > self.half) | (high < -self.half)
+    }
+
     /// What is within these depths from here surely is within the limits of the ray.
     #[inline(always)]
     pub fn inner_window(&self, ray: &PreparedRay) -> [f32; 2] {

@@ -76,6 +76,7 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
 ) -> Triangles<<S as Width<16>>::V> {
     let middle = Middle::of(ray, &block.aabb);
     let window = middle.window(ray, t_bound);
+    let lanes = if middle.is_beyond(window) { 0 } else { lanes };
     if S::FEW > 0 && lanes.count_ones() <= S::FEW {
         return few(ray, middle, window, block, lanes).loaded(s);
     }
