@@ -10,6 +10,10 @@ use crate::ray::{PACKET, Ray};
 use crate::simd::{self, Kernel, Simd};
 use crate::trace::{Question, ask};
 
+/// Blocks of fewer bytes mostly are in the cache, and single calls then wait for nothing that others could use: with
+/// closest hits, and with any hits, which are over sooner.
+const NEAR: [usize; 2] = [2 << 20, 16 << 20];
+
 /// Answers `question` for each ray, by `keep` into its answer; stops at the end of the shorter slice.
 pub(crate) fn ask_all<Q: Question + Copy, A>(
     block: &Block,
@@ -26,10 +30,6 @@ pub(crate) fn ask_all<Q: Question + Copy, A>(
         _ => ask_each(block, rays, answers, question, keep),
     }
 }
-
-/// Blocks of fewer bytes mostly are in the cache, and single calls then wait for nothing that others could use: with
-/// closest hits, and with any hits, which are over sooner.
-const NEAR: [usize; 2] = [2 << 20, 16 << 20];
 
 /// The same, one ray after the other.
 pub(crate) fn ask_each<Q: Question + Copy, A>(

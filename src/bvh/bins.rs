@@ -110,7 +110,7 @@ impl Bins {
         Bins([const { Axis { bounds: [Box4::EMPTY; BINS], counts: [0; BINS] } }; 3]);
 }
 
-/// The best split by bins of the box that the centres do not leave, or `None` when all fall into one.
+/// The best split by bins of the box around the centres, or `None` when all fall into one.
 ///
 /// Source: \[Wald07\].
 pub(crate) fn best_plane(

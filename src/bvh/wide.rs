@@ -9,8 +9,8 @@ use crate::simd::{Simd, Width};
 
 /// Where a ray stands on its way through a tree of bundles.
 ///
-/// A bundle's children that the ray enters go to the stack in one step and the nearest of them is taken
-/// back; with one child, the usual case near the leaves, the stack is not touched. The stack is
+/// A bundle's children that the ray enters go to the stack in the order of their distance, in one step, but for the
+/// nearest, which is next; with one child, the usual case near the leaves, the stack is not touched. The stack is
 /// culled once for each hit that was accepted, so taking from it tests nothing.
 pub(crate) struct Walk<'m, const ROOM: usize> {
     stack: Stack<'m, ROOM>,

@@ -156,15 +156,13 @@ impl Leaves<'_> {
         let number = number as u32;
         // Neither `t` nor order matters to those that want any hit.
         let inside = if Q::ORDERED { 0 } else { found.inside(s, ray) };
-        let lanes = if inside == 0 { found.candidates } else { inside };
-        if lanes.is_power_of_two() || inside != 0 {
-            let lane = lanes.trailing_zeros();
+        let alone = found.candidates.is_power_of_two();
+        if alone || inside != 0 {
+            let lane = if inside == 0 { found.candidates } else { inside }.trailing_zeros();
             let certain = Certain { sure: found.sure >> lane & 1 == 1, inside: inside != 0 };
-            if consider(block, number, lane, certain, ray, query) {
-                return true;
-            }
-            if found.candidates.is_power_of_two() {
-                return false;
+            let ended = consider(block, number, lane, certain, ray, query);
+            if ended || alone {
+                return ended;
             }
         }
         s.run(Several { block, number, t_bound, found: found.stored(), ray, query })

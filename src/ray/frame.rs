@@ -54,12 +54,16 @@ pub(crate) struct Shear {
     pub low: f32,
 }
 
+/// Far below every bound on coordinates and squares in the frame, and far above what underflow can take
+/// away.
+pub(crate) const TINY: f32 = 1.0 / (1u128 << 100) as f32;
+
 /// What depths that are computed from limits are widened by, for one rounding and for what the scaling of vertices took
 /// below the frame's least float.
 #[inline(always)]
 fn depth_slack(depth: f32) -> f32 {
     // Infinite depths stay as they are.
-    depth.abs().min(f32::MAX) * (4.0 * UNIT32) + 1.0 / (1u128 << 100) as f32
+    depth.abs().min(f32::MAX) * (4.0 * UNIT32) + TINY
 }
 
 impl Shear {
@@ -250,6 +254,7 @@ fn depth_axis([x, y, z, _]: [f32; 4]) -> usize {
     let [x, y, z] = [x, y, z].map(f32::abs);
     if z >= x && z >= y { 2 } else { usize::from(y >= x) }
 }
+
 /// The lanes of a vector.
 #[inline(always)]
 fn array<S: Simd>(v: <S as Width<4>>::V) -> [f32; 4] {

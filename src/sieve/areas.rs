@@ -2,14 +2,13 @@
 //!
 //! Source: \[WBW13\] for the shear; the bounds are our own, derived in `docs/METHODS.md`.
 
-use super::TINY;
 use crate::math::rounding::UNIT32;
-use crate::ray::PreparedRay;
+use crate::ray::{PreparedRay, TINY};
 use crate::simd::{Lanes, Width, mul_sub};
 
 /// Depths of vertices: how far along the ray's axis they are.
 #[derive(Clone, Copy)]
-pub(crate) struct Along<V> {
+pub(super) struct Along<V> {
     /// From the frame's zero, without rounding.
     pub raw: V,
     /// From the ray's origin.
@@ -36,7 +35,7 @@ impl<V: Copy> Along<V> {
 /// Vertices in the sheared space, in which the ray is the line x = y = 0 and depth grows along it, but for their
 /// depth.
 #[derive(Clone, Copy)]
-pub(crate) struct Across<V> {
+pub(super) struct Across<V> {
     /// Minus x, and minus y: areas are the same.
     pub x: V,
     pub y: V,
@@ -88,7 +87,7 @@ pub(super) fn shared_error(ray: &PreparedRay, deepest: f32) -> f32 {
 ///
 /// With `e` what a coordinate may be off, `e (4 size + 2 e) + 4.5 u size^2`, as a polynomial in `size`.
 #[derive(Clone, Copy)]
-pub(crate) struct AreaError {
+pub(super) struct AreaError {
     pub linear: f32,
     pub constant: f32,
 }
@@ -112,10 +111,10 @@ impl AreaError {
 
 /// The areas that the ray's point spans with the edges of triangles, each over the vertex opposite to it.
 #[derive(Clone, Copy)]
-pub(crate) struct Areas<V> {
-    pub(super) over: [V; 3],
+pub(super) struct Areas<V> {
+    pub over: [V; 3],
     /// What each of them may be off.
-    pub(super) error: V,
+    pub error: V,
 }
 
 impl<V: Copy> Areas<V> {

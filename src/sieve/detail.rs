@@ -2,13 +2,12 @@
 
 use glam::Vec3;
 
-use super::TINY;
 use super::meetings::Middle;
 use super::triangle::{One, sheared};
 use super::vector::{cross, dot, sum_abs};
 use crate::math::Aabb;
 use crate::math::rounding::UNIT32;
-use crate::ray::PreparedRay;
+use crate::ray::{PreparedRay, TINY};
 
 /// One triangle in `f32`.
 #[derive(Clone, Copy, Debug)]

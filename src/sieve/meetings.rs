@@ -1,10 +1,9 @@
 //! Triangles along the ray: the depth at which it meets their planes, and the limits.
 
-use super::TINY;
 use super::areas::Areas;
 use crate::math::Aabb;
 use crate::math::rounding::UNIT32;
-use crate::ray::PreparedRay;
+use crate::ray::{PreparedRay, TINY};
 use crate::simd::{Lanes, Width, mul_add, mul_sub};
 
 /// The middle of a box along the ray: depths near it are small numbers, wherever the ray starts.
@@ -91,19 +90,32 @@ impl<V: Copy> Meetings<V> {
         Meetings { total: total.abs(), rise, error }
     }
 
+    /// How far the meetings are before each of these depths, times `total`.
+    #[inline(always)]
+    fn before<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
+        &self,
+        s: S,
+        [low, high]: [f32; 2],
+    ) -> [V; 2]
+    where
+        V: Lanes<N>,
+    {
+        let low = mul_sub::<V, FUSED, N>(self.total, s.splat(low), self.rise);
+        [low, mul_sub::<V, FUSED, N>(self.total, s.splat(high), self.rise)]
+    }
+
     /// Lanes that the ray surely does not meet between these depths.
     #[inline(always)]
     pub fn outside<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
         &self,
         s: S,
-        [low, high]: [f32; 2],
+        depths: [f32; 2],
     ) -> u32
     where
         V: Lanes<N>,
     {
-        let before = mul_sub::<V, FUSED, N>(self.total, s.splat(low), self.rise);
-        let not_past = mul_sub::<V, FUSED, N>(self.total, s.splat(high), self.rise);
-        self.error.less(before) | not_past.less(s.splat(0.0).sub(self.error))
+        let [low, high] = self.before::<S, FUSED, N>(s, depths);
+        self.error.less(low) | high.less(s.splat(0.0).sub(self.error))
     }
 
     /// Lanes that the ray surely meets between these depths, if its line passes between the edges.
@@ -111,14 +123,13 @@ impl<V: Copy> Meetings<V> {
     pub fn inside<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
         &self,
         s: S,
-        [low, high]: [f32; 2],
+        depths: [f32; 2],
     ) -> u32
     where
         V: Lanes<N>,
     {
-        let before = mul_sub::<V, FUSED, N>(self.total, s.splat(low), self.rise);
-        let not_past = mul_sub::<V, FUSED, N>(self.total, s.splat(high), self.rise);
-        before.less(s.splat(0.0).sub(self.error)) & self.error.less(not_past)
+        let [low, high] = self.before::<S, FUSED, N>(s, depths);
+        low.less(s.splat(0.0).sub(self.error)) & self.error.less(high)
     }
 
     /// In memory.

@@ -12,7 +12,3 @@ mod vector;
 pub(crate) use detail::detail;
 pub(crate) use sphere::{SphereDetail, sphere};
 pub(crate) use triangle::{Triangles, triangles};
-
-/// Far below every bound on coordinates and squares in the frame, and far above what underflow can take
-/// away.
-const TINY: f32 = 1.0 / (1u128 << 100) as f32;

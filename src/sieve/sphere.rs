@@ -2,11 +2,10 @@
 
 use glam::Vec3;
 
-use super::TINY;
 use super::vector::{dot, sum_abs};
 use crate::math::float::sqrt32;
 use crate::math::rounding::UNIT32;
-use crate::ray::PreparedRay;
+use crate::ray::{PreparedRay, TINY};
 
 /// One sphere in `f32`.
 #[derive(Clone, Copy, Debug)]

@@ -37,7 +37,7 @@ impl<V: Lanes<16>> Triangles<V> {
         Width::<16>::nearest(s, lanes, depth, &NUMBERS).1
     }
 
-    /// The lanes whose meeting may come up to `t_bound`.
+    /// The lanes whose meeting may come up to `t_bound`. Never fused, as this serves both precisions.
     #[inline(always)]
     pub fn up_to<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
         !self.meetings.outside::<S, false, 16>(s, self.middle.window(ray, t_bound))

@@ -114,7 +114,7 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// So few lanes of 16 are faster one by one.
     const FEW: u32;
 
-    /// Whether batches keep several rays in flight: where vectors are fast enough to wait for memory. Elsewhere it
+    /// Whether batches trace rays together and keep several in flight: where vectors are fast enough to wait for memory. Elsewhere it
     /// would only be one more copy of the code.
     const FLIES: bool = false;
 

@@ -9,7 +9,7 @@ use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
 use super::avx2::F8;
-use super::sort::{self, least_of_four, sorted_four};
+use super::sort;
 use super::sse2::F4;
 use crate::simd::{Kernel, Lanes, Simd, Width};
 
@@ -90,20 +90,6 @@ width! {
             let words = _mm512_maskz_compress_epi32(mask, words);
             let numbers = _mm512_loadu_si512(NUMBERS.as_ptr().cast());
             let used = (0xFFFF_u32 >> (16 - count)) as __mmask16;
-            // What is found first is the nearest, which all else waits for.
-            if count <= 4 {
-                let (near, words) = (_mm512_castsi512_si128(near), _mm512_castsi512_si128(words));
-                let keys = _mm_andnot_si128(_mm_set1_epi32(3), near);
-                let keys = _mm_or_si128(keys, _mm512_castsi512_si128(numbers));
-                let used = used as __mmask8;
-                let least = _mm_mask_mov_epi32(_mm_set1_epi32(i32::MAX), used, keys);
-                let (near, words) = (_mm_castsi128_ps(near), _mm_castsi128_ps(words));
-                let least = _mm_castps_si128(_mm_permutevar_ps(words, least_of_four(least)));
-                let keys = sorted_four(_mm_mask_mov_epi32(_mm_set1_epi32(i32::MIN), used, keys));
-                _mm_storeu_ps(near_out.cast(), _mm_permutevar_ps(near, keys));
-                _mm_storeu_ps(words_out.cast(), _mm_permutevar_ps(words, keys));
-                return _mm_cvtsi128_si32(least) as u32;
-            }
             if count <= 8 {
                 let (near, words) = (_mm512_castsi512_si256(near), _mm512_castsi512_si256(words));
                 return sort::sort(near, words, count, near_out, words_out);
@@ -147,7 +133,9 @@ width! {
     }
 }
 
-/// Integers in order, the largest first, as for [four](sorted_four).
+/// Integers in order, the largest first.
+///
+/// Source: \[Bat68\].
 ///
 /// # Safety
 ///

@@ -94,7 +94,7 @@ pub(super) unsafe fn sort(
 ///
 /// The processor has AVX2.
 #[inline(always)]
-pub(super) unsafe fn least_of_four(keys: __m128i) -> __m128i {
+unsafe fn least_of_four(keys: __m128i) -> __m128i {
     // SAFETY: the caller's promise.
     unsafe {
         let keys = _mm_min_epi32(keys, _mm_shuffle_epi32::<0x4E>(keys));
@@ -119,7 +119,7 @@ macro_rules! step {
 ///
 /// The processor has AVX2.
 #[inline(always)]
-pub(super) unsafe fn sorted_four(mut keys: __m128i) -> __m128i {
+unsafe fn sorted_four(mut keys: __m128i) -> __m128i {
     macro_rules! step4 {
         ($order:literal, $mask:literal) => {
             step!(_mm_max_epi32 _mm_min_epi32 _mm_blend_epi32,
@@ -141,7 +141,7 @@ pub(super) unsafe fn sorted_four(mut keys: __m128i) -> __m128i {
 ///
 /// The processor has AVX2.
 #[inline(always)]
-pub(super) unsafe fn sorted_eight(mut keys: __m256i) -> __m256i {
+unsafe fn sorted_eight(mut keys: __m256i) -> __m256i {
     macro_rules! step8 {
         ($other:expr, $mask:literal) => {
             step!(_mm256_max_epi32 _mm256_min_epi32 _mm256_blend_epi32, keys, $other, $mask)
