@@ -98,8 +98,24 @@ pub(super) unsafe fn keep_up_to(
     refs: &mut [MaybeUninit<u32>],
     t_bound: f32,
 ) -> usize {
-    let mut kept = 0;
-    for i in 0..near.len().min(refs.len()) {
+    // SAFETY: the caller's promise.
+    unsafe { keep_from(0, 0, near, refs, t_bound) }
+}
+
+/// The same for the entries from `from` on, which go behind the `kept` first ones.
+///
+/// # Safety
+///
+/// All entries are written.
+#[inline(always)]
+pub(super) unsafe fn keep_from(
+    from: usize,
+    mut kept: usize,
+    near: &mut [MaybeUninit<f32>],
+    refs: &mut [MaybeUninit<u32>],
+    t_bound: f32,
+) -> usize {
+    for i in from..near.len().min(refs.len()) {
         // SAFETY: the caller's promise, and what is moved was written.
         let t = unsafe { near[i].assume_init() };
         near[kept] = near[i];

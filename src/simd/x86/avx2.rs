@@ -161,6 +161,37 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn keep_up_to(
+        self,
+        near: &mut [MaybeUninit<f32>],
+        refs: &mut [MaybeUninit<u32>],
+        t_bound: f32,
+    ) -> usize {
+        let count = near.len().min(refs.len());
+        let (mut from, mut kept) = (0, 0);
+        while from + 8 <= count {
+            // SAFETY: the token proves AVX2. Eight entries below `count` are read, and written where at least
+            // as many were read.
+            unsafe {
+                let (near, refs) = (near.as_mut_ptr(), refs.as_mut_ptr());
+                let t = _mm256_loadu_ps(near.add(from).cast());
+                let words = _mm256_loadu_si256(refs.add(from).cast());
+                let keep = _mm256_cmp_ps::<_CMP_NGT_UQ>(t, _mm256_set1_ps(t_bound));
+                let keep = _mm256_movemask_ps(keep) as u32;
+                let numbers = sort::numbers_of(keep);
+                let t = _mm256_permutevar8x32_ps(t, numbers);
+                let words = _mm256_permutevar8x32_epi32(words, numbers);
+                _mm256_storeu_ps(near.add(kept).cast(), t);
+                _mm256_storeu_si256(refs.add(kept).cast(), words);
+                kept += keep.count_ones() as usize;
+            }
+            from += 8;
+        }
+        // SAFETY: the caller's promise; what was moved was written.
+        unsafe { scalar::keep_from(from, kept, near, refs, t_bound) }
+    }
+
+    #[inline(always)]
     fn largest_of_three(self, v: F4) -> F4 {
         v.largest_of_three()
     }
