@@ -94,7 +94,7 @@ impl<'m> Accel<'m> {
     /// `block` is the first byte of such a block, which nobody writes to during `'m`.
     #[cfg(feature = "capi")]
     #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
-    #[inline]
+    #[inline(always)]
     pub(crate) unsafe fn from_ptr(block: *const u8) -> Option<Accel<'m>> {
         // SAFETY: the caller's promise.
         unsafe { Block::known(block) }.map(Accel)
@@ -171,13 +171,15 @@ impl<'m> Accel<'m> {
     ///
     /// Hit or miss, the primitive and the order are those of real arithmetic on the given floats,
     /// and `t` is the nearest float to the real one, for all finite inputs.
+    #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.intersect_with(ray, &QueryOptions::default())
+        trace::ask(&self.0, ray, ClosestHit::<Exact, _, 1>::new(self.everything(), ()))
     }
 
     /// Whether anything is hit: true exactly when [`intersect`](Self::intersect) finds a hit.
+    #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.occluded_with(ray, &QueryOptions::default())
+        trace::ask(&self.0, ray, AnyHit::<Exact, _>::new(self.everything(), ()))
     }
 
     /// The closest hit among what `options` leaves.
@@ -306,6 +308,11 @@ impl<'m> Accel<'m> {
 
     fn leaves(&self) -> Leaves<'m> {
         Leaves::of(&self.0)
+    }
+
+    #[inline(always)]
+    fn everything(&self) -> Filter<'m> {
+        Filter::everything(self.0.geometries, self.0.prim_ids)
     }
 
     #[inline(always)]

@@ -34,7 +34,7 @@ impl<'m> Block<'m> {
     #[cfg(feature = "capi")]
     #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
     #[allow(clippy::multiple_unsafe_ops_per_block, reason = "one proof covers all parts")]
-    #[inline]
+    #[inline(always)]
     pub unsafe fn known(block: *const u8) -> Option<Self> {
         // SAFETY: the caller's promise.
         let header: &'m Header = unsafe { &*block.cast() };

@@ -7,6 +7,8 @@ use super::types::{
 };
 use super::versioned::{self, Output, pointer};
 use super::{accel_at, answer, guard};
+use core::mem::offset_of;
+
 use crate::accel::Accel;
 use crate::query::{Facing, Precision, PrimId, QueryOptions};
 use crate::ray::{Hit, Ray};
@@ -26,8 +28,17 @@ pub unsafe extern "C" fn rt_intersect(
     ray: *const RtRay,
     hit: *mut RtHit,
 ) -> bool {
-    // SAFETY: the caller's promise; null stands for the default query.
-    unsafe { rt_intersect_with(accel, ray, core::ptr::null(), hit) }
+    let ask = || -> Result<bool, Error> {
+        // SAFETY: the caller's promise.
+        let accel = unsafe { accel_at(accel) }?;
+        // SAFETY: the caller's promise.
+        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
+        let found = accel.intersect(ray);
+        // SAFETY: not null, aligned, and valid as the caller promises.
+        unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
+        Ok(found.is_some())
+    };
+    answer(|| ask().unwrap_or(false), false)
 }
 
 /// Whether the ray hits anything: true exactly when `rt_intersect` is. False when a pointer is null.
@@ -37,8 +48,13 @@ pub unsafe extern "C" fn rt_intersect(
 /// Both pointers are null or valid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rt_occluded(accel: *const RtAccel, ray: *const RtRay) -> bool {
-    // SAFETY: the caller's promise; null stands for the default query.
-    unsafe { rt_occluded_with(accel, ray, core::ptr::null()) }
+    let ask = || -> Result<bool, Error> {
+        // SAFETY: the caller's promise.
+        let accel = unsafe { accel_at(accel) }?;
+        // SAFETY: the caller's promise.
+        Ok(accel.occluded(unsafe { ray_at(ray) }?))
+    };
+    answer(|| ask().unwrap_or(false), false)
 }
 
 /// `rt_intersect` for what `query` leaves; null leaves everything. When the query is refused, for a
@@ -57,12 +73,12 @@ pub unsafe extern "C" fn rt_intersect_with(
     let ask = || -> Result<bool, Error> {
         // SAFETY: the caller's promise.
         let accel = unsafe { accel_at(accel) }?;
-        let (ray, hit) = (pointer(ray)?, pointer(hit)?);
+        // SAFETY: the caller's promise.
+        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
         // SAFETY: the caller's promise.
         let options = unsafe { query_options(query) }?;
+        let found = accel.intersect_with(ray, &options);
         // SAFETY: not null, aligned, and valid as the caller promises.
-        let found = accel.intersect_with(&unsafe { ray.read() }.into(), &options);
-        // SAFETY: as above.
         unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
         Ok(found.is_some())
     };
@@ -83,11 +99,11 @@ pub unsafe extern "C" fn rt_occluded_with(
     let ask = || -> Result<bool, Error> {
         // SAFETY: the caller's promise.
         let accel = unsafe { accel_at(accel) }?;
-        let ray = pointer(ray)?;
+        // SAFETY: the caller's promise.
+        let ray = unsafe { ray_at(ray) }?;
         // SAFETY: the caller's promise.
         let options = unsafe { query_options(query) }?;
-        // SAFETY: not null, aligned, and valid as the caller promises.
-        Ok(accel.occluded_with(&unsafe { ray.read() }.into(), &options))
+        Ok(accel.occluded_with(ray, &options))
     };
     answer(|| ask().unwrap_or(false), false)
 }
@@ -200,13 +216,13 @@ pub unsafe extern "C" fn rt_hit_surface(
     guard(|| {
         // SAFETY: the caller's promise.
         let accel = unsafe { accel_at(accel) }?;
+        // SAFETY: the caller's promise.
+        let ray = unsafe { ray_at(ray) }?;
         // SAFETY: not null, aligned, and valid as the caller promises.
-        let ray = unsafe { pointer(ray)?.read() }.into();
-        // SAFETY: as above.
         let hit = unsafe { pointer(hit)?.read() }.into();
         // SAFETY: the caller's promise.
         let out = unsafe { Output::new(out) }?;
-        let surface = accel.surface(&ray, &hit).ok_or(Error::NotFound)?;
+        let surface = accel.surface(ray, &hit).ok_or(Error::NotFound)?;
         out.write(|struct_size| RtSurface::new(struct_size, &surface));
         Ok(())
     })
@@ -280,6 +296,27 @@ impl<T> Column<T> {
         self.first.wrapping_byte_add(i * self.stride)
     }
 }
+
+/// The ray at `ray`, checked for null and alignment.
+///
+/// # Safety
+///
+/// `ray` is null or valid, and nobody writes to it during `'r`.
+#[inline(always)]
+unsafe fn ray_at<'r>(ray: *const RtRay) -> Result<&'r Ray, Error> {
+    let ray = pointer(ray)?;
+    // SAFETY: not null, aligned, valid as the caller promises, and of the same layout.
+    Ok(unsafe { ray.cast().as_ref() })
+}
+
+/// A ray of C is one of Rust: the same floats in the same places, of which any is allowed.
+const _: () = {
+    assert!(size_of::<RtRay>() == size_of::<Ray>() && align_of::<RtRay>() == align_of::<Ray>());
+    assert!(offset_of!(RtRay, origin) == offset_of!(Ray, origin));
+    assert!(offset_of!(RtRay, t_min) == offset_of!(Ray, t_min));
+    assert!(offset_of!(RtRay, direction) == offset_of!(Ray, direction));
+    assert!(offset_of!(RtRay, t_max) == offset_of!(Ray, t_max));
+};
 
 /// The options at `query`, or the default ones for null.
 ///

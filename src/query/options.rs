@@ -80,6 +80,12 @@ pub(crate) struct Filter<'m> {
 }
 
 impl<'m> Filter<'m> {
+    /// Leaves out nothing.
+    #[inline(always)]
+    pub fn everything(geometries: &'m [Geometry], prim_ids: &'m [u32]) -> Self {
+        Filter { geometries, prim_ids, mask: 0, facing: Facing::Both, skip: NONE }
+    }
+
     /// The filter of `options` over a scene with these geometries.
     #[inline(always)]
     pub fn new(
