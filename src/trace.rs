@@ -7,7 +7,7 @@ use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
 use crate::query::{Any, Closest, Decide, Filter, Locate, Meets, Query, Watch, geometry_of};
-use crate::ray::{Hit, NONE, PreparedRay, Ray, Slab, WideSlab};
+use crate::ray::{Hit, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
 /// What is asked of a ray.
@@ -17,7 +17,8 @@ pub(crate) trait Question {
     /// Whether it need not be fast, which saves its code for every backend.
     const RARE: bool = false;
 
-    fn query(self, ray: &PreparedRay) -> Self::Query;
+    /// The query, of which nothing beyond this `t` of the frame is asked.
+    fn query(self, t_max: f32) -> Self::Query;
 
     /// The answer, from a query that a traversal has fed; `ended` is whether it ended the search.
     fn answer(
@@ -67,8 +68,8 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D
     const RARE: bool = W::COUNTS;
 
     #[inline(always)]
-    fn query(self, ray: &PreparedRay) -> Self::Query {
-        Closest::new(self.filter, ray, self.watch)
+    fn query(self, t_max: f32) -> Self::Query {
+        Closest::new(self.filter, t_max, self.watch)
     }
 
     #[inline(always)]
@@ -93,8 +94,8 @@ impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
     const RARE: bool = W::COUNTS;
 
     #[inline(always)]
-    fn query(self, ray: &PreparedRay) -> Self::Query {
-        Any::new(self.filter, ray, self.watch)
+    fn query(self, t_max: f32) -> Self::Query {
+        Any::new(self.filter, t_max, self.watch)
     }
 
     #[inline(always)]
@@ -130,8 +131,8 @@ impl<'m, D: Decide> Question for LocateHit<'m, D> {
     const RARE: bool = !D::ANY_BOXES;
 
     #[inline(always)]
-    fn query(self, ray: &PreparedRay) -> Self::Query {
-        Locate::new(self.number, self.t, ray, self.prim_ids)
+    fn query(self, t_max: f32) -> Self::Query {
+        Locate::new(self.number, self.t, t_max, self.prim_ids)
     }
 
     #[inline(always)]
@@ -164,12 +165,13 @@ impl<Q: Question> Kernel for Ask<'_, '_, Q> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q::Answer {
         let Ask { block, ray, question } = self;
-        let Some((ray, slab)) = ray.prepare_with(s, block.header.reach) else {
+        let Some((mut late, slab)) = ray.set_out(s, block.header.reach) else {
             return ask_odd(block, ray, question);
         };
-        let mut query = question.query(&ray);
-        let ended = trace(s, block, &ray, &slab, &mut query);
-        Q::answer(block, &ray, &mut query, ended)
+        let mut query = question.query(late.t_max);
+        let ended = trace(s, block, &mut late, &slab, &mut query);
+        // Nothing that is not prepared has met anything.
+        late.prepared().map_or(Q::nothing(), |ray| Q::answer(block, ray, &mut query, ended))
     }
 }
 
@@ -177,9 +179,10 @@ impl<Q: Question> Kernel for Ask<'_, '_, Q> {
 #[cold]
 #[inline(never)]
 fn ask_odd<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
-    let Some(ray) = ray.prepare_odd(block.header.reach) else { return Q::nothing() };
-    let mut query = question.query(&ray);
-    let ended = trace(Scalar, block, &ray, &WideSlab::new(&ray), &mut query);
+    let Some(mut ray) = ray.prepare_odd(block.header.reach) else { return Q::nothing() };
+    let mut query = question.query(ray.t_max);
+    let slab = WideSlab::new(&ray);
+    let ended = trace(Scalar, block, &mut ray, &slab, &mut query);
     Q::answer(block, &ray, &mut query, ended)
 }
 
@@ -199,7 +202,7 @@ fn hit<D: Decide>(block: &Block, ray: &PreparedRay, best: &D::Met, watch: &mut i
 fn trace<S: Simd, Q: Query>(
     s: S,
     block: &Block,
-    ray: &PreparedRay,
+    ray: &mut impl Late,
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
@@ -209,10 +212,10 @@ fn trace<S: Simd, Q: Query>(
         Bundles::Eight(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
         Bundles::Four(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
         Bundles::None => match (block.header.kind, block.grids.first()) {
-            (KIND_BVH, _) => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
+            (KIND_BVH, _) => bvh::traverse(s, block.nodes, leaves, ray.prepare(), slab, query),
             (KIND_GRID, Some(head)) => {
                 let (Block { words, runs, .. }, leaves) = (*block, *leaves);
-                grid::walk(s, &Cells { head, words, runs, leaves }, ray, query)
+                grid::walk(s, &Cells { head, words, runs, leaves }, ray.prepare(), query)
             }
             _ => leaves.intersect_all(s, ray, slab, query),
         },

@@ -86,7 +86,7 @@ impl<Q: Question + Copy, A> Batch<'_, '_, Q, A> {
                 self.answer_alone(flight.number);
                 continue;
             };
-            let query = self.question.query(&ray);
+            let query = self.question.query(ray.t_max);
             walk.restart(query.t_bound());
             flight.query = Some(query);
             flight.slab = slab;

@@ -65,7 +65,7 @@ impl<Q: Question + Copy, A> Batch<'_, '_, Q, A> {
         for (number, member) in members.iter_mut().enumerate().take(self.rays.len()) {
             match self.rays[number].prepare_with(s, self.block.header.reach) {
                 Some((ray, slab)) => {
-                    let query = self.question.query(&ray);
+                    let query = self.question.query(ray.t_max);
                     slabs.set(number, &slab);
                     slabs.set_bound(number, query.t_bound());
                     *member = Member { ray, query: Some(query) };

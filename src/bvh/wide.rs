@@ -4,7 +4,7 @@ use super::stack::{Columns, Stack};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
-use crate::ray::{PreparedRay, Slab, WideBoxes};
+use crate::ray::{Late, PreparedRay, Slab, WideBoxes};
 use crate::simd::{Simd, Width};
 
 /// Where a ray stands on its way through a tree of bundles.
@@ -112,7 +112,7 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     s: S,
     bundles: &[Bundle<W>],
     leaves: &Leaves,
-    ray: &PreparedRay,
+    late: &mut impl Late,
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
@@ -127,10 +127,17 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
             if !walk.enter::<S, Q, W>(s, bundle, &boxes, t_bounds) {
                 return false;
             }
+            if late.prepared().is_none() {
+                // Many rays pass the whole scene by, so this is worth a question a bundle.
+                if walk.at() == ChildRef::NONE {
+                    return false;
+                }
+                late.prepare();
+            }
         }
-        if walk.at() == ChildRef::NONE {
+        let (false, Some(ray)) = (walk.at() == ChildRef::NONE, late.prepared()) else {
             return false;
-        }
+        };
         if walk.open(s, leaves, ray, query) {
             return true;
         }

@@ -26,7 +26,7 @@ pub(super) fn sweep<Q: Query>(
     let widest = resolution[0].max(resolution[1]).max(resolution[2]);
     // Written so that a NaN or an infinity comes here.
     if !(2.0 * pad < f64::from(widest)) {
-        return cells.leaves.intersect_all(Scalar, ray, &WideSlab::new(ray), query);
+        return cells.leaves.intersect_all(Scalar, &mut { *ray }, &WideSlab::new(ray), query);
     }
     let major = cell_ray.major();
     let layers = resolution[major];

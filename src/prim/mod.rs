@@ -16,7 +16,7 @@ use crate::block::leaf::{
 };
 use crate::math::Aabb;
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
-use crate::ray::{PreparedRay, Slab, WideSlab};
+use crate::ray::{Late, PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Triangles};
 use crate::simd::{Kernel, Simd};
 
@@ -58,20 +58,23 @@ impl Leaves<'_> {
     pub fn intersect_all<S: Simd, Q: Query>(
         &self,
         s: S,
-        ray: &PreparedRay,
+        late: &mut impl Late,
         slab: &impl Slab,
         query: &mut Q,
     ) -> bool {
         for (number, block) in self.triangle_blocks.iter().enumerate() {
             query.watch().step();
             let part = slab.part(&block.aabb, query.t_bound());
-            if !part.is_empty()
-                && self.intersect_block(s, KIND_TRIANGLES, number, block.lanes(), ray, query)
-            {
+            if part.is_empty() {
+                continue;
+            }
+            let ray = late.prepare();
+            if self.intersect_block(s, KIND_TRIANGLES, number, block.lanes(), ray, query) {
                 return true;
             }
         }
         for (number, block) in self.sphere_blocks.iter().enumerate() {
+            let ray = late.prepare();
             if self.intersect_block(s, KIND_SPHERES, number, block.lanes(), ray, query) {
                 return true;
             }

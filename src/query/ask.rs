@@ -16,10 +16,10 @@ pub(crate) struct Closest<'m, D: Decide, W, const MEMORY: usize> {
 
 impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     #[inline(always)]
-    pub fn new(filter: Filter<'m>, ray: &PreparedRay, watch: W) -> Self {
+    pub fn new(filter: Filter<'m>, t_max: f32, watch: W) -> Self {
         Closest {
             filter,
-            t_bound: ray.t_max,
+            t_bound: t_max,
             best: None,
             memory: core::array::from_fn(|_| D::Memory::default()),
             watch,
@@ -103,8 +103,8 @@ pub(crate) struct Any<'m, D, W> {
 
 impl<'m, D: Decide, W: Watch> Any<'m, D, W> {
     #[inline(always)]
-    pub fn new(filter: Filter<'m>, ray: &PreparedRay, watch: W) -> Self {
-        Any { filter, t_max: ray.t_max, watch, decide: core::marker::PhantomData }
+    pub fn new(filter: Filter<'m>, t_max: f32, watch: W) -> Self {
+        Any { filter, t_max, watch, decide: core::marker::PhantomData }
     }
 }
 
@@ -155,8 +155,8 @@ pub(crate) struct Locate<'m, D: Decide> {
 
 impl<'m, D: Decide> Locate<'m, D> {
     #[inline(always)]
-    pub fn new(prim: u32, t: f32, ray: &PreparedRay, prim_ids: &'m [u32]) -> Self {
-        Locate { prim, prim_ids, t, t_max: ray.t_max, found: None, watch: () }
+    pub fn new(prim: u32, t: f32, t_max: f32, prim_ids: &'m [u32]) -> Self {
+        Locate { prim, prim_ids, t, t_max, found: None, watch: () }
     }
 
     #[inline(always)]

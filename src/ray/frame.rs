@@ -150,18 +150,18 @@ impl Ray {
         [t_min, t_max]
     }
 
-    /// What traversal needs of an ordinary ray, and the same for boxes. `None` for a ray that hits nothing by
+    /// What boxes need of an ordinary ray, and what the rest follows from. `None` for a ray that hits nothing by
     /// definition, and for those at the ends of the floats. `reach` is the largest coordinate of the scene,
     /// infinite if it is not representable.
     ///
     /// What all rays wait for is the way from the largest component over the reciprocals to the first boxes; so
     /// division does not wait for the frame, and both meet behind it.
     #[inline(always)]
-    pub(crate) fn prepare_with<S: Simd>(
+    pub(crate) fn set_out<S: Simd>(
         &self,
         s: S,
         reach: f32,
-    ) -> Option<(PreparedRay, NarrowSlab)> {
+    ) -> Option<(LateRay<S>, NarrowSlab)> {
         let splat = |x: f32| Width::<4>::splat(s, x);
         let [from, along] = self.rows();
         let (o, d) = (Width::<4>::load(s, &from), Width::<4>::load(s, &along));
@@ -184,24 +184,32 @@ impl Ray {
         let (e, l) = (exponent_bits(reach), exponent_bits(fastest));
         let scale = f32::from_bits((253 << 23) - e);
         let t_scale = f32::from_bits((126 << 23) + l - e);
-        let direction = d.mul(splat(f32::from_bits((254 << 23) - l)));
         let (t_min_below, t_max_above) = (below(t_min, t_scale), above(t_max, t_scale));
         let scales = Scales { t: t_scale, space: scale };
         let backwards = self.direction.map(f32::is_sign_negative);
         let slab = NarrowSlab::new(s, [o, d, inverse], scales, reach, t_min_below, backwards);
-        let (origin, direction) = (array::<S>(o.mul(splat(scale))), array::<S>(direction));
-        let depth = depth as usize % 3;
-        let ray = PreparedRay {
+        let ray = LateRay {
             given: Ray { t_min, t_max, ..*self },
-            scale,
-            origin,
-            direction,
-            t_scale: f64::from(t_scale),
+            origin: o.mul(splat(scale)),
+            direction: d.mul(splat(f32::from_bits((254 << 23) - l))),
+            scales,
             t_min: t_min_below,
             t_max: t_max_above,
-            shear: Shear::new(depth, &origin, &direction, scale, t_min_below),
+            depth: depth as usize % 3,
+            prepared: None,
         };
         Some((ray, slab))
+    }
+
+    /// The same with all that traversal needs.
+    #[inline(always)]
+    pub(crate) fn prepare_with<S: Simd>(
+        &self,
+        s: S,
+        reach: f32,
+    ) -> Option<(PreparedRay, NarrowSlab)> {
+        let (ray, slab) = self.set_out(s, reach)?;
+        Some((ray.rest(), slab))
     }
 
     /// The same without boxes, of any ray that can hit something.
@@ -246,6 +254,69 @@ impl Ray {
             t_max: f32_above(f64::from(t_max) * t_scale),
             shear: Shear::new(depth_axis(direction), &origin, &direction, scale, t_min_below),
         })
+    }
+}
+
+/// An ordinary ray. Until it is prepared only boxes can be tested, which is all that rays beside the scene need.
+pub(crate) struct LateRay<S: Simd> {
+    given: Ray,
+    origin: <S as Width<4>>::V,
+    direction: <S as Width<4>>::V,
+    scales: Scales,
+    t_min: f32,
+    pub t_max: f32,
+    depth: usize,
+    prepared: Option<PreparedRay>,
+}
+
+impl<S: Simd> LateRay<S> {
+    #[inline(always)]
+    fn rest(&self) -> PreparedRay {
+        let LateRay { given, scales: Scales { t, space }, t_min, t_max, depth, .. } = *self;
+        let (origin, direction) = (array::<S>(self.origin), array::<S>(self.direction));
+        PreparedRay {
+            given,
+            scale: space,
+            origin,
+            direction,
+            t_scale: f64::from(t),
+            t_min,
+            t_max,
+            shear: Shear::new(depth, &origin, &direction, space, t_min),
+        }
+    }
+}
+
+/// A ray that may not be prepared yet.
+pub(crate) trait Late {
+    fn prepared(&self) -> Option<&PreparedRay>;
+    fn prepare(&mut self) -> &PreparedRay;
+}
+
+impl<S: Simd> Late for LateRay<S> {
+    #[inline(always)]
+    fn prepared(&self) -> Option<&PreparedRay> {
+        self.prepared.as_ref()
+    }
+
+    #[inline(always)]
+    fn prepare(&mut self) -> &PreparedRay {
+        if self.prepared.is_none() {
+            self.prepared = Some(self.rest());
+        }
+        self.prepared.get_or_insert(PreparedRay::BLANK)
+    }
+}
+
+impl Late for PreparedRay {
+    #[inline(always)]
+    fn prepared(&self) -> Option<&PreparedRay> {
+        Some(self)
+    }
+
+    #[inline(always)]
+    fn prepare(&mut self) -> &PreparedRay {
+        self
     }
 }
 

@@ -6,7 +6,7 @@ mod frame;
 mod packet;
 mod slab;
 
-pub(crate) use frame::{PreparedRay, TINY};
+pub(crate) use frame::{Late, PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, PACKET, SlabPacket};
 pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
 
