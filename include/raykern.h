@@ -419,6 +419,13 @@ bool rt_occluded_with(const RtAccel *accel,
 // Why a query with these options would be refused, or RT_OK. Null is the default query.
 RtStatus rt_query_check(const RtQuery *query);
 
+// Writes to `*out` the surface at a hit that a query on this accel returned for this ray.
+// `out->struct_size` must be set. Costs about as much as `rt_intersect`.
+RtStatus rt_hit_surface(const RtAccel *accel,
+                        const RtRay *ray,
+                        const RtHit *hit,
+                        RtSurface *out);
+
 // `rt_intersect` for `count` rays. When a pointer is null, nothing is written.
 void rt_intersect_batch(const RtAccel *accel,
                         const RtRay *rays,
@@ -452,13 +459,6 @@ RtStatus rt_occluded_batch_with(const RtAccel *accel,
                                 uint8_t *occluded,
                                 size_t occluded_stride,
                                 size_t count);
-
-// Writes to `*out` the surface at a hit that a query on this accel returned for this ray.
-// `out->struct_size` must be set. Costs about as much as `rt_intersect`.
-RtStatus rt_hit_surface(const RtAccel *accel,
-                        const RtRay *ray,
-                        const RtHit *hit,
-                        RtSurface *out);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,13 +1,13 @@
 //! The face of a built structure.
 
 use crate::batch;
-use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID, KIND_LIST};
+use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST};
 use crate::bvh;
 use crate::error::OpenError;
 use crate::grid;
 use crate::prim::{self, Leaves};
 use crate::query::{
-    Counts, Decide, Exact, Filter, Meets, Precision, PrimId, QueryOptions, Watch, Watertight,
+    Choice, Counts, Decide, Exact, Meets, Precision, PrimId, QueryOptions, Watch, Watertight,
     flat_number,
 };
 use crate::ray::{Hit, Ray};
@@ -69,7 +69,7 @@ pub struct Info {
 
 /// A built structure: a view of one block in the caller's memory.
 #[derive(Clone, Copy)]
-pub struct Accel<'m>(Block<'m>);
+pub struct Accel<'m>(Finished<'m>);
 
 impl<'m> Accel<'m> {
     /// Opens a block that was built earlier, after checking it from end to end; nothing is copied.
@@ -84,7 +84,7 @@ impl<'m> Accel<'m> {
 
     /// The accel of a block that a build or [`open`](Self::open) returned: only the header is read.
     pub(crate) fn recognise(block: &'m [u8]) -> Result<Self, OpenError> {
-        Block::split(block).map(Accel)
+        Finished::split(block).map(Accel)
     }
 
     /// The accel of a block that a build or [`open`](Self::open) returned.
@@ -97,11 +97,11 @@ impl<'m> Accel<'m> {
     #[inline(always)]
     pub(crate) unsafe fn from_ptr(block: *const u8) -> Option<Accel<'m>> {
         // SAFETY: the caller's promise.
-        unsafe { Block::known(block) }.map(Accel)
+        unsafe { Finished::known(block) }.map(Accel)
     }
 
     fn is_sound(&self) -> bool {
-        let Block { header, geometries, grids, nodes, bundles, words, runs, .. } = self.0;
+        let Block { header, geometries, grids, nodes, bundles, words, runs, .. } = self.0.parts();
         let leaves = self.leaves();
         let no_grid = grids.is_empty() && words.is_empty() && runs.is_empty();
         let no_nodes = nodes.is_empty();
@@ -133,12 +133,13 @@ impl<'m> Accel<'m> {
 
     /// The block: what to copy, save or place in ROM.
     pub fn block(&self) -> &'m [u8] {
-        self.0.bytes
+        self.0.bytes()
     }
 
     /// What the block holds.
     pub fn info(&self) -> Info {
-        let Block { bytes, header, grids, nodes, bundles, words, runs, .. } = self.0;
+        let block = self.0.parts();
+        let Block { whole, header, grids, nodes, bundles, words, runs, .. } = block;
         Info {
             kind: match header.kind {
                 KIND_GRID => Kind::Grid,
@@ -155,14 +156,14 @@ impl<'m> Accel<'m> {
             sphere_count: header.sphere_count,
             ignored_count: header.ignored_count,
             resolution: grids.first().map_or([0; 3], |grid| grid.resolution),
-            size: bytes.len(),
+            size: whole.bytes().len(),
             structure_size: size_of_val(grids)
                 + size_of_val(nodes)
                 + bundles.size()
                 + size_of_val(words)
                 + size_of_val(runs),
-            leaf_size: size_of_val(self.0.triangle_blocks) + size_of_val(self.0.sphere_blocks),
-            id_size: size_of_val(self.0.prim_ids),
+            leaf_size: size_of_val(block.triangle_blocks) + size_of_val(block.sphere_blocks),
+            id_size: size_of_val(block.prim_ids),
         }
     }
 
@@ -173,13 +174,13 @@ impl<'m> Accel<'m> {
     /// and `t` is the nearest float to the real one, for all finite inputs.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        trace::ask(&self.0, ray, ClosestHit::<Exact, _, 1>::new(self.everything(), ()))
+        trace::ask(self.0, ray, ClosestHit::<Exact, _, 1>::new(Choice::EVERYTHING, ()))
     }
 
     /// Whether anything is hit: true exactly when [`intersect`](Self::intersect) finds a hit.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        trace::ask(&self.0, ray, AnyHit::<Exact, _>::new(self.everything(), ()))
+        trace::ask(self.0, ray, AnyHit::<Exact, _>::new(Choice::EVERYTHING, ()))
     }
 
     /// The closest hit among what `options` leaves.
@@ -206,16 +207,16 @@ impl<'m> Accel<'m> {
     /// [`intersect_with`](Self::intersect_with) for each ray; a miss is written as [`Hit::MISS`].
     /// Stops at the end of the shorter slice.
     pub fn intersect_batch_with(&self, rays: &[Ray], options: &QueryOptions, hits: &mut [Hit]) {
-        let (block, filter) = (&self.0, self.filter(options));
+        let (block, choice) = (self.0, self.choice(options));
         let keep = |hit: Option<Hit>| hit.unwrap_or(Hit::MISS);
         match options.precision {
             Precision::Exact => {
                 // Many of them are in flight, so each had better be small.
-                let question = ClosestHit::<Exact, _, 0>::new(filter, ());
+                let question = ClosestHit::<Exact, _, 0>::new(choice, ());
                 batch::ask_all(block, rays, hits, question, keep);
             }
             Precision::Watertight => {
-                let question = ClosestHit::<Watertight, _, 1>::new(filter, ());
+                let question = ClosestHit::<Watertight, _, 1>::new(choice, ());
                 batch::ask_each(block, rays, hits, question, keep);
             }
         }
@@ -223,14 +224,14 @@ impl<'m> Accel<'m> {
 
     /// [`occluded_with`](Self::occluded_with) for each ray. Stops at the end of the shorter slice.
     pub fn occluded_batch_with(&self, rays: &[Ray], options: &QueryOptions, occluded: &mut [bool]) {
-        let (block, filter) = (&self.0, self.filter(options));
+        let (block, choice) = (self.0, self.choice(options));
         let keep = |occluded| occluded;
         match options.precision {
             Precision::Exact => {
-                batch::ask_all(block, rays, occluded, AnyHit::<Exact, _>::new(filter, ()), keep);
+                batch::ask_all(block, rays, occluded, AnyHit::<Exact, _>::new(choice, ()), keep);
             }
             Precision::Watertight => {
-                let question = AnyHit::<Watertight, _>::new(filter, ());
+                let question = AnyHit::<Watertight, _>::new(choice, ());
                 batch::ask_each(block, rays, occluded, question, keep);
             }
         }
@@ -258,24 +259,24 @@ impl<'m> Accel<'m> {
         options: &QueryOptions,
         watch: impl Watch,
     ) -> Option<Hit> {
-        let (block, filter) = (&self.0, self.filter(options));
+        let (block, choice) = (self.0, self.choice(options));
         match options.precision {
             Precision::Exact => {
-                trace::ask(block, ray, ClosestHit::<Exact, _, 1>::new(filter, watch))
+                trace::ask(block, ray, ClosestHit::<Exact, _, 1>::new(choice, watch))
             }
             Precision::Watertight => {
-                trace::ask(block, ray, ClosestHit::<Watertight, _, 1>::new(filter, watch))
+                trace::ask(block, ray, ClosestHit::<Watertight, _, 1>::new(choice, watch))
             }
         }
     }
 
     #[inline(always)]
     fn occluded_watched(&self, ray: &Ray, options: &QueryOptions, watch: impl Watch) -> bool {
-        let (block, filter) = (&self.0, self.filter(options));
+        let (block, choice) = (self.0, self.choice(options));
         match options.precision {
-            Precision::Exact => trace::ask(block, ray, AnyHit::<Exact, _>::new(filter, watch)),
+            Precision::Exact => trace::ask(block, ray, AnyHit::<Exact, _>::new(choice, watch)),
             Precision::Watertight => {
-                trace::ask(block, ray, AnyHit::<Watertight, _>::new(filter, watch))
+                trace::ask(block, ray, AnyHit::<Watertight, _>::new(choice, watch))
             }
         }
     }
@@ -288,36 +289,33 @@ impl<'m> Accel<'m> {
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
         let Hit { prim, geometry, instance, .. } = *hit;
         let id = PrimId { prim, geometry, instance };
-        let number = flat_number(&id, self.0.geometries, self.0.header.prim_limit)?;
+        let Block { geometries, header, .. } = self.0.parts();
+        let number = flat_number(&id, geometries, header.prim_limit)?;
         self.surface_of::<Exact>(ray, number, hit.t)
             .or_else(|| self.surface_of::<Watertight>(ray, number, hit.t))
     }
 
     /// The surface at the hit with this flat number and `t` in one precision.
     fn surface_of<D: Decide>(&self, ray: &Ray, number: u32, t: f32) -> Option<Surface> {
-        let found = trace::ask(&self.0, ray, LocateHit::<D>::new(number, t, &self.0))?;
+        let found = trace::ask(self.0, ray, LocateHit::<D>::new(number, t))?;
         let line = ray.line();
         let (block, lane) = (found.place().block as usize, found.place().lane as usize);
-        if number < self.0.header.triangle_limit {
-            let corners = self.0.triangle_blocks.get(block)?.triangle(lane);
+        let Block { header, triangle_blocks, sphere_blocks, .. } = self.0.parts();
+        if number < header.triangle_limit {
+            let corners = triangle_blocks.get(block)?.triangle(lane);
             return Some(surface::of_triangle(&line, corners));
         }
-        let (centre, radius) = self.0.sphere_blocks.get(block)?.sphere(lane);
+        let (centre, radius) = sphere_blocks.get(block)?.sphere(lane);
         Some(surface::of_sphere(&line, centre, radius, found.root()))
     }
 
     fn leaves(&self) -> Leaves<'m> {
-        Leaves::of(&self.0)
+        Leaves::of(&self.0.parts())
     }
 
     #[inline(always)]
-    fn everything(&self) -> Filter<'m> {
-        Filter::everything(self.0.geometries, self.0.prim_ids)
-    }
-
-    #[inline(always)]
-    fn filter(&self, options: &QueryOptions) -> Filter<'m> {
-        let Block { header, geometries, prim_ids, .. } = self.0;
-        Filter::new(options, geometries, header.prim_limit, prim_ids)
+    fn choice(&self, options: &QueryOptions) -> Choice {
+        let Block { header, geometries, .. } = self.0.parts();
+        Choice::new(options, geometries, header.prim_limit)
     }
 }

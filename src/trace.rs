@@ -2,27 +2,29 @@
 
 use core::marker::PhantomData;
 
-use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID};
+use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
-use crate::query::{Any, Closest, Decide, Filter, Locate, Meets, Query, Watch, geometry_of};
+use crate::query::{
+    Any, Choice, Closest, Decide, Filter, Locate, Meets, Query, Watch, geometry_of,
+};
 use crate::ray::{Hit, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
 /// What is asked of a ray.
-pub(crate) trait Question {
+pub(crate) trait Question<'m> {
     type Query: Query;
     type Answer;
     /// Whether it need not be fast, which saves its code for every backend.
     const RARE: bool = false;
 
     /// The query, of which nothing beyond this `t` of the frame is asked.
-    fn query(self, t_max: f32) -> Self::Query;
+    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query;
 
     /// The answer, from a query that a traversal has fed; `ended` is whether it ended the search.
     fn answer(
-        block: &Block,
+        block: &Block<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
         ended: bool,
@@ -34,42 +36,43 @@ pub(crate) trait Question {
 
 /// The closest hit that the filter leaves; `MEMORY` as for [`Closest`].
 #[derive(Clone, Copy)]
-pub(crate) struct ClosestHit<'m, D, W, const MEMORY: usize> {
-    filter: Filter<'m>,
+pub(crate) struct ClosestHit<D, W, const MEMORY: usize> {
+    choice: Choice,
     watch: W,
     decide: PhantomData<D>,
 }
 
 /// Whether anything is hit that the filter leaves.
 #[derive(Clone, Copy)]
-pub(crate) struct AnyHit<'m, D, W> {
-    filter: Filter<'m>,
+pub(crate) struct AnyHit<D, W> {
+    choice: Choice,
     watch: W,
     decide: PhantomData<D>,
 }
 
-impl<'m, D, W, const MEMORY: usize> ClosestHit<'m, D, W, MEMORY> {
+impl<D, W, const MEMORY: usize> ClosestHit<D, W, MEMORY> {
     #[inline(always)]
-    pub fn new(filter: Filter<'m>, watch: W) -> Self {
-        ClosestHit { filter, watch, decide: PhantomData }
+    pub fn new(choice: Choice, watch: W) -> Self {
+        ClosestHit { choice, watch, decide: PhantomData }
     }
 }
 
-impl<'m, D, W> AnyHit<'m, D, W> {
+impl<D, W> AnyHit<D, W> {
     #[inline(always)]
-    pub fn new(filter: Filter<'m>, watch: W) -> Self {
-        AnyHit { filter, watch, decide: PhantomData }
+    pub fn new(choice: Choice, watch: W) -> Self {
+        AnyHit { choice, watch, decide: PhantomData }
     }
 }
 
-impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D, W, MEMORY> {
+impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question<'m> for ClosestHit<D, W, MEMORY> {
     type Query = Closest<'m, D, W, MEMORY>;
     type Answer = Option<Hit>;
     const RARE: bool = W::COUNTS;
 
     #[inline(always)]
-    fn query(self, t_max: f32) -> Self::Query {
-        Closest::new(self.filter, t_max, self.watch)
+    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
+        let filter = Filter::new(self.choice, block.geometries, block.prim_ids);
+        Closest::new(filter, t_max, self.watch)
     }
 
     #[inline(always)]
@@ -80,7 +83,7 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D
         _ended: bool,
     ) -> Option<Hit> {
         let Closest { best, watch, .. } = query;
-        Some(hit::<D>(block, ray, best.as_ref()?, watch))
+        Some(hit::<D>(block.whole, ray, best.as_ref()?, watch))
     }
 
     fn nothing() -> Option<Hit> {
@@ -88,14 +91,15 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D
     }
 }
 
-impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
+impl<'m, D: Decide, W: Watch> Question<'m> for AnyHit<D, W> {
     type Query = Any<'m, D, W>;
     type Answer = bool;
     const RARE: bool = W::COUNTS;
 
     #[inline(always)]
-    fn query(self, t_max: f32) -> Self::Query {
-        Any::new(self.filter, t_max, self.watch)
+    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
+        let filter = Filter::new(self.choice, block.geometries, block.prim_ids);
+        Any::new(filter, t_max, self.watch)
     }
 
     #[inline(always)]
@@ -110,29 +114,28 @@ impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
 
 /// The meeting with the primitive of a number at an answered `t`.
 #[derive(Clone, Copy)]
-pub(crate) struct LocateHit<'m, D> {
+pub(crate) struct LocateHit<D> {
     number: u32,
     t: f32,
-    prim_ids: &'m [u32],
     decide: PhantomData<D>,
 }
 
-impl<'m, D> LocateHit<'m, D> {
+impl<D> LocateHit<D> {
     /// With this flat number and `t`.
-    pub fn new(number: u32, t: f32, block: &Block<'m>) -> Self {
-        LocateHit { number, t, prim_ids: block.prim_ids, decide: PhantomData }
+    pub fn new(number: u32, t: f32) -> Self {
+        LocateHit { number, t, decide: PhantomData }
     }
 }
 
-impl<'m, D: Decide> Question for LocateHit<'m, D> {
+impl<'m, D: Decide> Question<'m> for LocateHit<D> {
     type Query = Locate<'m, D>;
     type Answer = Option<D::Met>;
     // Hits of the watertight mode, which is tried second, are rarely looked up.
     const RARE: bool = !D::ANY_BOXES;
 
     #[inline(always)]
-    fn query(self, t_max: f32) -> Self::Query {
-        Locate::new(self.number, self.t, t_max, self.prim_ids)
+    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
+        Locate::new(self.number, self.t, t_max, block.prim_ids)
     }
 
     #[inline(always)]
@@ -147,28 +150,30 @@ impl<'m, D: Decide> Question for LocateHit<'m, D> {
 
 /// The answer to `question` for one ray.
 #[inline(always)]
-pub(crate) fn ask<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
+pub(crate) fn ask<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
     let ask = Ask { block, ray, question };
     if Q::RARE { ask.run(Scalar) } else { simd::dispatch(ask) }
 }
 
 /// One ray, waiting for a backend.
 struct Ask<'a, 'm, Q> {
-    block: &'a Block<'m>,
+    block: Finished<'m>,
     ray: &'a Ray,
     question: Q,
 }
 
-impl<Q: Question> Kernel for Ask<'_, '_, Q> {
+impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
     type Output = Q::Answer;
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q::Answer {
         let Ask { block, ray, question } = self;
+        // Parts are not lent to what is out of line, which would have them all computed.
+        let block = &block.parts();
         let Some((mut late, slab)) = ray.set_out(s, block.header.reach) else {
-            return ask_odd(block, ray, question);
+            return ask_odd(block.whole, ray, question);
         };
-        let mut query = question.query(late.t_max);
+        let mut query = question.query(block, late.t_max);
         let ended = trace(s, block, &mut late, &slab, &mut query);
         // Nothing that is not prepared has met anything.
         late.prepared().map_or(Q::nothing(), |ray| Q::answer(block, ray, &mut query, ended))
@@ -178,9 +183,10 @@ impl<Q: Question> Kernel for Ask<'_, '_, Q> {
 /// For rays and scenes at the ends of the floats, with boxes in `f64`. They are so rare that portable code will do.
 #[cold]
 #[inline(never)]
-fn ask_odd<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
+fn ask_odd<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
+    let block = &block.parts();
     let Some(mut ray) = ray.prepare_odd(block.header.reach) else { return Q::nothing() };
-    let mut query = question.query(ray.t_max);
+    let mut query = question.query(block, ray.t_max);
     let slab = WideSlab::new(&ray);
     let ended = trace(Scalar, block, &mut ray, &slab, &mut query);
     Q::answer(block, &ray, &mut query, ended)
@@ -188,10 +194,16 @@ fn ask_odd<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
 
 /// The record of the meeting that won.
 #[inline(never)]
-fn hit<D: Decide>(block: &Block, ray: &PreparedRay, best: &D::Met, watch: &mut impl Watch) -> Hit {
-    let number = best.place().prim(block.prim_ids);
+fn hit<D: Decide>(
+    block: Finished,
+    ray: &PreparedRay,
+    best: &D::Met,
+    watch: &mut impl Watch,
+) -> Hit {
+    let Block { prim_ids, geometries, .. } = block.parts();
+    let number = best.place().prim(prim_ids);
     let (geometry, first) =
-        geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
+        geometry_of(number, geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
     let [u, v] = D::weights(best);
     let t = D::t(ray, best, watch);
     Hit { t, u, v, prim: number - first, geometry, instance: NONE }

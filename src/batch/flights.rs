@@ -40,7 +40,7 @@ enum Turn {
     Crowded,
 }
 
-impl<Q: Question + Copy, A> Batch<'_, '_, Q, A> {
+impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
     /// Traces rays that have little in common: while the memory that one needs next is on its way, the others go on.
     #[inline(always)]
     pub(super) fn fly<S: Simd>(mut self, s: S) {
@@ -86,7 +86,7 @@ impl<Q: Question + Copy, A> Batch<'_, '_, Q, A> {
                 self.answer_alone(flight.number);
                 continue;
             };
-            let query = self.question.query(ray.t_max);
+            let query = self.question.query(self.block, ray.t_max);
             walk.restart(query.t_bound());
             flight.query = Some(query);
             flight.slab = slab;

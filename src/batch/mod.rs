@@ -4,7 +4,7 @@ mod flights;
 mod packet;
 
 use crate::block::bundle::Bundle;
-use crate::block::{Block, Bundles};
+use crate::block::{Block, Bundles, Finished};
 use crate::query::Query;
 use crate::ray::{PACKET, Ray};
 use crate::simd::{self, Kernel, Simd};
@@ -15,25 +15,26 @@ use crate::trace::{Question, ask};
 const NEAR: [usize; 2] = [2 << 20, 16 << 20];
 
 /// Answers `question` for each ray, by `keep` into its answer; stops at the end of the shorter slice.
-pub(crate) fn ask_all<Q: Question + Copy, A>(
-    block: &Block,
+pub(crate) fn ask_all<'m, Q: Question<'m> + Copy, A>(
+    block: Finished<'m>,
     rays: &[Ray],
     answers: &mut [A],
     question: Q,
     keep: fn(Q::Answer) -> A,
 ) {
     // Only for the layout that is chosen automatically: others would be more copies of the code.
-    match block.bundles {
+    let parts = &block.parts();
+    match parts.bundles {
         Bundles::Sixteen(bundles) if rays.len() > 1 => {
-            simd::dispatch(Batch { block, bundles, rays, answers, question, keep });
+            simd::dispatch(Batch { block: parts, bundles, rays, answers, question, keep });
         }
         _ => ask_each(block, rays, answers, question, keep),
     }
 }
 
 /// The same, one ray after the other.
-pub(crate) fn ask_each<Q: Question + Copy, A>(
-    block: &Block,
+pub(crate) fn ask_each<'m, Q: Question<'m> + Copy, A>(
+    block: Finished<'m>,
     rays: &[Ray],
     answers: &mut [A],
     question: Q,
@@ -45,7 +46,7 @@ pub(crate) fn ask_each<Q: Question + Copy, A>(
 }
 
 /// Rays that ask the same question, and where their answers go.
-struct Batch<'a, 'm, Q: Question, A> {
+struct Batch<'a, 'm, Q: Question<'m>, A> {
     block: &'a Block<'m>,
     bundles: &'m [Bundle<16>],
     rays: &'a [Ray],
@@ -54,17 +55,17 @@ struct Batch<'a, 'm, Q: Question, A> {
     keep: fn(Q::Answer) -> A,
 }
 
-impl<Q: Question + Copy, A> Kernel for Batch<'_, '_, Q, A> {
+impl<'m, Q: Question<'m> + Copy, A> Kernel for Batch<'_, 'm, Q, A> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(mut self, s: S) {
         if !S::FLIES {
             let Batch { block, rays, answers, question, keep, .. } = self;
-            return ask_each(block, rays, answers, question, keep);
+            return ask_each(block.whole, rays, answers, question, keep);
         }
         let count = self.rays.len().min(self.answers.len());
-        let near = self.block.bytes.len() < NEAR[usize::from(!Q::Query::ORDERED)];
+        let near = self.block.whole.bytes().len() < NEAR[usize::from(!Q::Query::ORDERED)];
         let mut first = 0;
         while first < count {
             let (alike, end) = self.stretch(s, first, count);
@@ -72,7 +73,7 @@ impl<Q: Question + Copy, A> Kernel for Batch<'_, '_, Q, A> {
             if alike {
                 part.trace_together(s);
             } else if near {
-                ask_each(part.block, part.rays, part.answers, part.question, part.keep);
+                ask_each(part.block.whole, part.rays, part.answers, part.question, part.keep);
             } else {
                 part.fly(s);
             }
@@ -81,7 +82,7 @@ impl<Q: Question + Copy, A> Kernel for Batch<'_, '_, Q, A> {
     }
 }
 
-impl<'m, Q: Question + Copy, A> Batch<'_, 'm, Q, A> {
+impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
     /// Where the packet that begins with the ray `first` ends, or else where the next one begins.
     #[inline(always)]
     fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (bool, usize) {
@@ -117,7 +118,7 @@ impl<'m, Q: Question + Copy, A> Batch<'_, 'm, Q, A> {
     #[inline(never)]
     fn answer_alone(&mut self, number: usize) {
         if let Some(ray) = self.rays.get(number) {
-            let answer = ask(self.block, ray, self.question);
+            let answer = ask(self.block.whole, ray, self.question);
             self.write(number, answer);
         }
     }

@@ -56,7 +56,7 @@ impl<Q> Member<Q> {
     const NONE: Self = Member { ray: PreparedRay::BLANK, query: None };
 }
 
-impl<Q: Question + Copy, A> Batch<'_, '_, Q, A> {
+impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
     /// Traces rays that [are alike](are_alike), [`PACKET`] at most.
     #[inline(always)]
     pub(super) fn trace_together<S: Simd>(mut self, s: S) {
@@ -65,7 +65,7 @@ impl<Q: Question + Copy, A> Batch<'_, '_, Q, A> {
         for (number, member) in members.iter_mut().enumerate().take(self.rays.len()) {
             match self.rays[number].prepare_with(s, self.block.header.reach) {
                 Some((ray, slab)) => {
-                    let query = self.question.query(ray.t_max);
+                    let query = self.question.query(self.block, ray.t_max);
                     slabs.set(number, &slab);
                     slabs.set_bound(number, query.t_bound());
                     *member = Member { ray, query: Some(query) };

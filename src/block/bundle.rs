@@ -3,7 +3,7 @@
 #![allow(unsafe_code, reason = "a promise about the layout drawn here")]
 
 use super::leaf::{KIND_SPHERES, KIND_TRIANGLES};
-use crate::storage::{self, Plain};
+use crate::storage::Plain;
 
 /// `W` sibling records of a box and a reference, transposed: 4, 8 or 16.
 ///
@@ -120,22 +120,6 @@ impl Bundles<'_> {
             Bundles::Eight(bundles) => size_of_val(*bundles),
             Bundles::Sixteen(bundles) => size_of_val(*bundles),
         }
-    }
-}
-
-impl<'m> Bundles<'m> {
-    /// `lanes` lanes of bundles of this layout at `offset`; they fill their last bundle.
-    pub fn view(bytes: &'m [u8], offset: usize, layout: u32, lanes: u32) -> Option<Self> {
-        if lanes.checked_rem(layout)? != 0 {
-            return None;
-        }
-        let count = (lanes / layout) as usize;
-        Some(match layout {
-            4 => Bundles::Four(storage::view(bytes, offset, count)?),
-            8 => Bundles::Eight(storage::view(bytes, offset, count)?),
-            16 => Bundles::Sixteen(storage::view(bytes, offset, count)?),
-            _ => (lanes == 0).then_some(Bundles::None)?,
-        })
     }
 }
 

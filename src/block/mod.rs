@@ -19,7 +19,7 @@ mod view;
 pub(crate) use bundle::Bundles;
 pub(crate) use leaf::Geometry;
 pub(crate) use node::BvhNode;
-pub(crate) use view::Block;
+pub(crate) use view::{Block, Finished};
 
 use bundle::LANE;
 use cells::{GridHead, Run};

@@ -52,6 +52,12 @@ impl<'m, const ROOM: usize> Stack<'m, ROOM> {
         ChildRef(self.reference(last))
     }
 
+    /// The child that would be taken next, or [`ChildRef::NONE`].
+    #[inline(always)]
+    pub fn top(&self) -> ChildRef {
+        self.count.checked_sub(1).map_or(ChildRef::NONE, |last| ChildRef(self.reference(last)))
+    }
+
     /// Pushes the children in the lanes of `mask`, two at least, far ones first but for the nearest, which it returns;
     /// `None` when there is no room.
     #[inline(always)]

@@ -3,6 +3,7 @@
 //! `build.rs` makes `include/raykern.h` of these files. Every entry point passes through [`guard`]
 //! or [`answer`], which set the caller's floating-point state aside and stop panics.
 
+mod batch;
 mod build;
 mod control;
 mod lender;

@@ -1,4 +1,4 @@
-//! Asking: one ray, or many.
+//! Asking for one ray.
 
 use super::status::{Error, RtStatus};
 use super::types::{
@@ -9,7 +9,6 @@ use super::versioned::{self, Output, pointer};
 use super::{accel_at, answer, guard};
 use core::mem::offset_of;
 
-use crate::accel::Accel;
 use crate::query::{Facing, Precision, PrimId, QueryOptions};
 use crate::ray::{Hit, Ray};
 use crate::surface::Surface;
@@ -119,87 +118,6 @@ pub unsafe extern "C" fn rt_query_check(query: *const RtQuery) -> RtStatus {
     guard(|| unsafe { query_options(query) }.map(drop))
 }
 
-/// `rt_intersect` for `count` rays. When a pointer is null, nothing is written.
-///
-/// # Safety
-///
-/// Every pointer is null or valid for `count` elements, and nobody else uses `hits` during the call.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rt_intersect_batch(
-    accel: *const RtAccel,
-    rays: *const RtRay,
-    hits: *mut RtHit,
-    count: usize,
-) {
-    // SAFETY: the caller's promise.
-    let _ = unsafe { rt_intersect_batch_with(accel, rays, 0, core::ptr::null(), hits, 0, count) };
-}
-
-/// `rt_occluded` for `count` rays: 1 for a hit, 0 for none. When a pointer is null, nothing is
-/// written.
-///
-/// # Safety
-///
-/// Every pointer is null or valid for `count` elements, and nobody else uses `occluded` during the
-/// call.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rt_occluded_batch(
-    accel: *const RtAccel,
-    rays: *const RtRay,
-    occluded: *mut u8,
-    count: usize,
-) {
-    // SAFETY: the caller's promise.
-    let _ =
-        unsafe { rt_occluded_batch_with(accel, rays, 0, core::ptr::null(), occluded, 0, count) };
-}
-
-/// `rt_intersect_with` for `count` rays, `ray_stride` bytes apart, into hits `hit_stride` bytes
-/// apart. A stride of 0 means packed; others are multiples of 4 and no less than the struct.
-/// `query` may be null. When refused, nothing is written.
-///
-/// # Safety
-///
-/// Every pointer is null or valid for `count` elements, and nobody else uses `hits` during the call.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rt_intersect_batch_with(
-    accel: *const RtAccel,
-    rays: *const RtRay,
-    ray_stride: usize,
-    query: *const RtQuery,
-    hits: *mut RtHit,
-    hit_stride: usize,
-    count: usize,
-) -> RtStatus {
-    let out = (hits, hit_stride);
-    let ask = Accel::intersect_batch_with;
-    // SAFETY: the caller's promise.
-    guard(|| unsafe { batch(accel, (rays, ray_stride), query, out, count, (Hit::MISS, ask)) })
-}
-
-/// `rt_occluded_with` for `count` rays, `ray_stride` bytes apart, into bytes `occluded_stride` bytes
-/// apart. A stride of 0 means packed. `query` may be null. When refused, nothing is written.
-///
-/// # Safety
-///
-/// Every pointer is null or valid for `count` elements, and nobody else uses `occluded` during the
-/// call.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rt_occluded_batch_with(
-    accel: *const RtAccel,
-    rays: *const RtRay,
-    ray_stride: usize,
-    query: *const RtQuery,
-    occluded: *mut u8,
-    occluded_stride: usize,
-    count: usize,
-) -> RtStatus {
-    let out = (occluded, occluded_stride);
-    let ask = Accel::occluded_batch_with;
-    // SAFETY: the caller's promise.
-    guard(|| unsafe { batch(accel, (rays, ray_stride), query, out, count, (false, ask)) })
-}
-
 /// Writes to `*out` the surface at a hit that a query on this accel returned for this ray.
 /// `out->struct_size` must be set. Costs about as much as `rt_intersect`.
 ///
@@ -228,75 +146,6 @@ pub unsafe extern "C" fn rt_hit_surface(
     })
 }
 
-/// So many rays are read, asked for together and answered before the next.
-const PART: usize = 128;
-
-/// How the rays of a batch are asked for together, and what stands for no answer yet.
-type AskTogether<'m, A> = (A, fn(&Accel<'m>, &[Ray], &QueryOptions, &mut [A]));
-
-/// Asks for each of `count` rays and writes the answers; arrays come with their strides.
-///
-/// # Safety
-///
-/// Every pointer is null or valid for `count` elements, and nobody else uses `out` during the call.
-unsafe fn batch<'m, A: Copy + Into<T>, T>(
-    accel: *const RtAccel,
-    rays: (*const RtRay, usize),
-    query: *const RtQuery,
-    out: (*mut T, usize),
-    count: usize,
-    (none, ask): AskTogether<'m, A>,
-) -> Result<(), Error> {
-    // SAFETY: the caller's promise.
-    let accel = unsafe { accel_at(accel) }?;
-    // SAFETY: the caller's promise.
-    let options = unsafe { query_options(query) }?;
-    let rays = Column::new(rays.0, rays.1, count)?;
-    let out = Column::new(out.0.cast_const(), out.1, count)?;
-    let mut part = [Ray::new([0.0; 3], [0.0; 3]); PART];
-    let mut answers = [none; PART];
-    for first in (0..count).step_by(PART) {
-        let size = PART.min(count - first);
-        for (i, ray) in part[..size].iter_mut().enumerate() {
-            // SAFETY: below `count`, and valid as the caller promises.
-            *ray = unsafe { rays.at(first + i).read() }.into();
-        }
-        ask(&accel, &part[..size], &options, &mut answers[..size]);
-        for (i, answer) in answers[..size].iter().enumerate() {
-            // SAFETY: as above; C passed this pointer as one to write to.
-            unsafe { out.at(first + i).cast_mut().write((*answer).into()) };
-        }
-    }
-    Ok(())
-}
-
-/// Elements of a caller's array at equal distances.
-struct Column<T> {
-    first: *const T,
-    stride: usize,
-}
-
-impl<T> Column<T> {
-    /// Checked for null, unless there are no elements, for alignment and for overflow.
-    fn new(first: *const T, stride: usize, count: usize) -> Result<Self, Error> {
-        let stride = if stride == 0 { size_of::<T>() } else { stride };
-        if stride < size_of::<T>() || stride % align_of::<T>() != 0 {
-            return Err(Error::InvalidArgument);
-        }
-        if count > 0 {
-            let first = pointer(first)?;
-            let bytes = count.checked_mul(stride).filter(|bytes| isize::try_from(*bytes).is_ok());
-            first.addr().checked_add(bytes.ok_or(Error::TooLarge)?).ok_or(Error::TooLarge)?;
-        }
-        Ok(Column { first, stride })
-    }
-
-    /// Where element `i` is; `new` has checked that this does not overflow below `count`.
-    fn at(&self, i: usize) -> *const T {
-        self.first.wrapping_byte_add(i * self.stride)
-    }
-}
-
 /// The ray at `ray`, checked for null and alignment.
 ///
 /// # Safety
@@ -323,7 +172,7 @@ const _: () = {
 /// # Safety
 ///
 /// `query` is null or valid.
-unsafe fn query_options(query: *const RtQuery) -> Result<QueryOptions, Error> {
+pub(super) unsafe fn query_options(query: *const RtQuery) -> Result<QueryOptions, Error> {
     if query.is_null() {
         return Ok(QueryOptions::default());
     }

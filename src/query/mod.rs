@@ -11,8 +11,8 @@ mod watertight;
 
 pub(crate) use ask::{Any, Closest, Locate};
 pub(crate) use exact::Exact;
+pub(crate) use options::{Choice, Filter, flat_number, geometry_of};
 pub use options::{Facing, Precision, PrimId, QueryOptions};
-pub(crate) use options::{Filter, flat_number, geometry_of};
 pub(crate) use watertight::Watertight;
 
 use crate::block::leaf::{Place, TriangleBlock};

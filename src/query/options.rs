@@ -71,45 +71,50 @@ pub struct QueryOptions {
 
 /// What a query leaves out, in flat numbers.
 #[derive(Clone, Copy)]
-pub(crate) struct Filter<'m> {
-    geometries: &'m [Geometry],
-    pub prim_ids: &'m [u32],
+pub(crate) struct Choice {
     mask: u32,
     facing: Facing,
     skip: u32,
 }
 
-impl<'m> Filter<'m> {
+impl Choice {
     /// Leaves out nothing.
-    #[inline(always)]
-    pub fn everything(geometries: &'m [Geometry], prim_ids: &'m [u32]) -> Self {
-        Filter { geometries, prim_ids, mask: 0, facing: Facing::Both, skip: NONE }
-    }
+    pub const EVERYTHING: Self = Choice { mask: 0, facing: Facing::Both, skip: NONE };
 
-    /// The filter of `options` over a scene with these geometries.
+    /// What `options` leave of a scene with these geometries.
     #[inline(always)]
-    pub fn new(
-        options: &QueryOptions,
-        geometries: &'m [Geometry],
-        prim_limit: u32,
-        prim_ids: &'m [u32],
-    ) -> Self {
+    pub fn new(options: &QueryOptions, geometries: &[Geometry], prim_limit: u32) -> Self {
         let skip = options.skip.and_then(|id| flat_number(&id, geometries, prim_limit));
         let QueryOptions { mask, facing, .. } = *options;
-        Filter { geometries, prim_ids, mask, facing, skip: skip.unwrap_or(NONE) }
+        Choice { mask, facing, skip: skip.unwrap_or(NONE) }
+    }
+}
+
+/// A choice among the primitives of a block.
+#[derive(Clone, Copy)]
+pub(crate) struct Filter<'m> {
+    geometries: &'m [Geometry],
+    pub prim_ids: &'m [u32],
+    choice: Choice,
+}
+
+impl<'m> Filter<'m> {
+    #[inline(always)]
+    pub fn new(choice: Choice, geometries: &'m [Geometry], prim_ids: &'m [u32]) -> Self {
+        Filter { geometries, prim_ids, choice }
     }
 
     /// Whether a meeting with the primitive stored there counts; only those that are `skippable` are
     /// skipped.
     #[inline(always)]
     pub fn sees(&self, place: Place, skippable: bool) -> bool {
-        let sees_all = self.mask == 0 && (self.skip == NONE || !skippable);
+        let sees_all = self.choice.mask == 0 && (self.choice.skip == NONE || !skippable);
         sees_all || self.sees_prim(place.prim(self.prim_ids), skippable)
     }
 
     #[inline(never)]
     fn sees_prim(&self, prim: u32, skippable: bool) -> bool {
-        !(skippable && prim == self.skip) && (self.mask == 0 || self.mask_sees(prim))
+        !(skippable && prim == self.choice.skip) && (self.choice.mask == 0 || self.mask_sees(prim))
     }
 
     /// Has the number of the primitive stored there fetched: it is far away, and asked for last.
@@ -123,13 +128,13 @@ impl<'m> Filter<'m> {
     /// Whether meetings with either side count.
     #[inline(always)]
     pub fn both_sides(&self) -> bool {
-        self.facing == Facing::Both
+        self.choice.facing == Facing::Both
     }
 
     /// Whether a meeting with this side counts; an unknown one does.
     #[inline(always)]
     pub fn faces(&self, front: Option<bool>) -> bool {
-        match self.facing {
+        match self.choice.facing {
             Facing::Both => true,
             Facing::Front => front != Some(false),
             Facing::Back => front != Some(true),
@@ -138,7 +143,7 @@ impl<'m> Filter<'m> {
 
     fn mask_sees(&self, prim: u32) -> bool {
         let mask = geometry_of(prim, self.geometries).map_or(0, |(_, g)| g.mask);
-        mask == 0 || mask & self.mask != 0
+        mask == 0 || mask & self.choice.mask != 0
     }
 }
 

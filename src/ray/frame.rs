@@ -157,11 +157,7 @@ impl Ray {
     /// What all rays wait for is the way from the largest component over the reciprocals to the first boxes; so
     /// division does not wait for the frame, and both meet behind it.
     #[inline(always)]
-    pub(crate) fn set_out<S: Simd>(
-        &self,
-        s: S,
-        reach: f32,
-    ) -> Option<(LateRay<S>, NarrowSlab)> {
+    pub(crate) fn set_out<S: Simd>(&self, s: S, reach: f32) -> Option<(LateRay<S>, NarrowSlab)> {
         let splat = |x: f32| Width::<4>::splat(s, x);
         let [from, along] = self.rows();
         let (o, d) = (Width::<4>::load(s, &from), Width::<4>::load(s, &along));

@@ -158,6 +158,10 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     #[inline(always)]
     fn prefetch<T>(self, _what: &T) {}
 
+    /// The same for `LINES` cache lines from `first` on, wherever that points to.
+    #[inline(always)]
+    fn prefetch_lines<const LINES: usize>(self, _first: *const u8) {}
+
     /// Runs `kernel` with the backend's instructions, in a function of its own; all that it inlines may use them.
     fn run<K: Kernel>(self, kernel: K) -> K::Output;
 }

@@ -202,6 +202,11 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn prefetch_lines<const LINES: usize>(self, first: *const u8) {
+        (0..LINES).for_each(|line| super::prefetch_line(first, line));
+    }
+
+    #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
         #[inline(never)]

@@ -35,9 +35,13 @@ pub(super) unsafe fn run_with<K: Kernel>(backend: Backend, kernel: K) -> K::Outp
 /// Asks for each cache line of `what`.
 #[inline(always)]
 pub(super) fn prefetch<T>(what: &T) {
-    let first = core::ptr::from_ref(what).cast::<i8>();
-    for line in (0..size_of::<T>()).step_by(64) {
-        // SAFETY: SSE is part of x86-64, and a prefetch reads nothing.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(line)) };
-    }
+    let first = core::ptr::from_ref(what).cast();
+    (0..size_of::<T>().div_ceil(64)).for_each(|line| prefetch_line(first, line));
+}
+
+/// Asks for a cache line.
+#[inline(always)]
+fn prefetch_line(first: *const u8, line: usize) {
+    // SAFETY: SSE is part of x86-64, and a prefetch reads nothing.
+    unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_add(64 * line).cast()) };
 }

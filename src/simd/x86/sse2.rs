@@ -35,6 +35,11 @@ impl Simd for Sse2 {
         super::prefetch(what);
     }
 
+    #[inline(always)]
+    fn prefetch_lines<const LINES: usize>(self, first: *const u8) {
+        (0..LINES).for_each(|line| super::prefetch_line(first, line));
+    }
+
     #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)
