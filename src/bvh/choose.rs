@@ -84,12 +84,11 @@ impl Subtrees {
         let children = [(left, start + 1..middle), (right, middle..end)];
         self.pairs[i..self.count].rotate_left(1);
         self.count -= 1;
-        let mut at = i;
-        for (_, pairs) in children.into_iter().filter(|(child, _)| !child.is_leaf()) {
+        let inner = children.into_iter().filter(|(child, _)| !child.is_leaf());
+        for (at, (_, pairs)) in (i..).zip(inner) {
             *self.pairs.get_mut(self.count)? = pairs;
             self.count += 1;
             self.pairs[at..self.count].rotate_right(1);
-            at += 1;
         }
         Some(())
     }
