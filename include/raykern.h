@@ -183,7 +183,7 @@ typedef struct RtBuildOptions {
     uint32_t worker_count;
     // Handed to the two calls below.
     void *user;
-    // Or null: all is done on the calling thread. Speeds up the tree of a BVH.
+    // Or null: all is done on the calling thread. Speeds up the build of a BVH, and the check of its scene.
     RtParallelFor parallel_for;
     // Or null.
     RtProgress progress;

@@ -27,10 +27,10 @@ pub struct Memory {
 /// How much time a build may take for the sake of the rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
-    /// SAH over 16 bins on each axis, for large nodes by samples.
+    /// SAH over 16 bins on each axis, for large nodes by samples; pairs of triangles as one.
     #[default]
     Balanced,
-    /// For a structure that is built often: the widest axis alone, fewer samples.
+    /// For a structure that is built often: short strips of triangles as one, the widest axis alone, fewer samples.
     Fast,
     /// For a structure that is built once: 32 bins, every primitive in them.
     Best,
@@ -61,8 +61,8 @@ pub struct BuildOptions<'a> {
     pub refit: bool,
     /// Whether a plain list may stand in.
     pub plain_list: PlainList,
-    /// Threads that the build may use; none of them is kept. They make a BVH's tree; the rest, and a grid, is
-    /// built by the caller's own.
+    /// Threads that the build may use, and its `needs`; none of them is kept. They check the scene and build a BVH; a grid
+    /// is built by the caller's own.
     pub threads: Option<&'a dyn Threads>,
     /// Told how far the build is, from 0 to 1, on the thread that builds; false cancels it. It is
     /// asked a few times a build, not at equal times.
@@ -148,7 +148,7 @@ impl<'s, 'a> Job<'s, 'a> {
     ) -> Result<Self, BuildError> {
         options.check()?;
         let survey = survey(scene)?;
-        let census = Census::take(scene, &survey)?;
+        let census = Census::take(scene, &survey, &Caller::new(options.threads, None))?;
         let handful = match options.plain_list {
             PlainList::Automatic => list::HANDFUL,
             PlainList::Never => 0,

@@ -3,6 +3,7 @@
 #![allow(unsafe_code, reason = "tasks take elements of one slice apart")]
 
 use core::cell::Cell;
+use core::ops::Range;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 /// The caller's threads, lent to a build.
@@ -14,6 +15,9 @@ pub trait Threads: Sync {
     /// all are done. Tasks never block and never nest.
     fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync));
 }
+
+/// Parts at most into which work is shared out.
+pub(crate) const PARTS: usize = 64;
 
 /// The caller, as a build in progress sees it.
 pub(crate) struct Caller<'a> {
@@ -41,6 +45,38 @@ impl<'a> Caller<'a> {
     /// Whether the caller wanted no more.
     pub fn cancelled(&self) -> bool {
         self.cancelled.get()
+    }
+
+    /// The size of the parts into which `count` things are shared out: a multiple of `grain`, and large enough
+    /// for [`PARTS`] to be all. It depends on the threads, so what is made of the parts must not depend on it.
+    pub fn part_size(&self, count: usize, grain: usize) -> usize {
+        count.div_ceil(self.part_count()).next_multiple_of(grain).max(grain)
+    }
+
+    /// A good number of parts for the threads there are, at most [`PARTS`].
+    pub fn part_count(&self) -> usize {
+        self.threads.map_or(1, |threads| threads.worker_count().saturating_mul(4).min(PARTS))
+    }
+
+    /// What `work` makes of each part of `0..count`, in order; at most [`PARTS`] of this size.
+    pub fn map_parts<T: Send>(
+        &self,
+        count: usize,
+        size: usize,
+        work: impl Fn(Range<usize>) -> T + Sync,
+    ) -> impl Iterator<Item = T> {
+        let mut parts = [const { None }; PARTS];
+        let starts = (0..count).step_by(size);
+        let used = starts.len();
+        for (part, start) in parts.iter_mut().zip(starts) {
+            *part = Some((start..count.min(start + size), None));
+        }
+        self.for_each(&mut parts[..used], |part| {
+            if let Some((range, made)) = part {
+                *made = Some(work(range.clone()));
+            }
+        });
+        parts.into_iter().flatten().filter_map(|(_, made)| made)
     }
 
     /// Calls `work` with each item: on the caller's threads, if there are any.
@@ -133,5 +169,20 @@ mod tests {
         let caller = Caller::new(None, Some(&progress));
         assert_eq!([0.1, 0.2, 0.3].map(|part| caller.done(part).is_some()), [true, false, false]);
         assert!(caller.cancelled() && asked.get() == 2);
+    }
+
+    #[test]
+    fn parts_are_all_there_in_order() {
+        for caller in [Caller::new(None, None), Caller::new(Some(&Odd), None)] {
+            for count in [0, 1, 9, 10, 1000, 100_003] {
+                let size = caller.part_size(count, 10);
+                let parts = caller.map_parts(count, size, |part| (part.start, part.end));
+                let end = parts.fold(0, |end, part| {
+                    assert!(part.0 == end && (part.1 - end == size || part.1 == count));
+                    part.1
+                });
+                assert_eq!(end, count);
+            }
+        }
     }
 }

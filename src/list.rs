@@ -43,7 +43,8 @@ pub(crate) fn build(
 /// Packs the primitives in the order of their numbers; returns the number of triangle blocks.
 fn pack(scene: &Scene, census: &Census, parts: PartsMut) -> usize {
     geometries(scene, parts.geometries);
-    let mut packer = Packer::new(parts.triangle_blocks, parts.sphere_blocks, census.triangle_count);
+    let mut packer =
+        Packer::new(parts.triangle_blocks, parts.sphere_blocks, 0, census.triangle_count);
     let (triangle_ids, sphere_ids) = parts.prim_ids.split_at_mut(census.triangle_count as usize);
     let (mut triangle_ids, mut sphere_ids) = (triangle_ids.iter_mut(), sphere_ids.iter_mut());
     for_each_prim(scene, |prim| {

@@ -35,6 +35,7 @@ impl<'a, T: Copy> Strided<'a, T> {
     }
 
     /// Element `i`, or `None` beyond the last one.
+    #[inline(always)]
     pub fn get<const N: usize>(&self, i: usize) -> Option<[T; N]> {
         if i >= self.count {
             return None;
@@ -98,7 +99,15 @@ impl<'a> Mesh<'a> {
         self.mask
     }
 
+    /// The first index of triangle `i`, if it has any.
+    #[inline]
+    pub(crate) fn first_index(&self, i: usize) -> Option<&'a u32> {
+        let indices = self.indices.as_ref()?;
+        indices.words.get(i.wrapping_mul(indices.stride))
+    }
+
     /// The vertices of triangle `i`, or `None` when it or one of its vertices does not exist.
+    #[inline]
     pub fn triangle(&self, i: usize) -> Option<[[f32; 3]; 3]> {
         let corner = |v: usize| self.vertices.get::<3>(v);
         let [a, b, c] = match &self.indices {
@@ -163,7 +172,7 @@ enum Source<'a> {
 }
 
 /// Geometries that are made when they are asked for.
-pub(crate) trait Geometries<'a> {
+pub(crate) trait Geometries<'a>: Sync {
     fn mesh_count(&self) -> usize;
     fn mesh(&self, i: usize) -> Option<Mesh<'a>>;
     fn sphere_set_count(&self) -> usize;

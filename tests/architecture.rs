@@ -20,7 +20,10 @@ const HOUSE: &[(&str, &[&str])] = &[
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
     ("query", &["block", "exact", "interval", "ray", "sieve", "simd"]),
-    ("prim", &["block", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"]),
+    (
+        "prim",
+        &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
+    ),
     ("list", &["block", "error", "prim", "scene"]),
     ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd"]),
     (

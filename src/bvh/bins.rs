@@ -1,7 +1,7 @@
 //! Where to part the refs of a large node: SAH over bins.
 
 use super::refs::PrimRef;
-use super::split::{Areas, Box4, centre, greater, lesser};
+use super::split::{Areas, Box4, centre, greater, lesser, middle};
 
 /// Bins along each axis at most.
 const BINS: usize = 32;
@@ -15,33 +15,24 @@ pub(crate) struct Effort {
     samples: usize,
     /// Whether only the axis is looked at along which the centres are furthest apart.
     one_axis: bool,
+    /// Triangles at most that go as one, each with an edge of the one before.
+    pub strip: usize,
 }
 
 impl Effort {
-    pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true };
-    pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false };
-    pub const BEST: Effort = Effort { bins: BINS, samples: ALL, one_axis: false };
+    pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true, strip: 4 };
+    pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false, strip: 2 };
+    pub const BEST: Effort = Effort { bins: BINS, samples: ALL, one_axis: false, strip: 1 };
 
-    /// The same for these refs, or the best where few are much larger than the others, such as the walls of a building: a
-    /// sample says nothing of them, and where they are parted matters.
-    pub fn for_refs(self, refs: &[PrimRef], areas: Areas) -> Effort {
-        let (mut sum, mut squares) = (0.0, 0.0);
-        for r in refs {
-            let area = f64::from(areas.of_finite(&r.bounds));
-            sum += area;
-            squares += area * area;
-        }
-        // 1 where all are alike, about `n / k` where `k` have most of the area.
-        let uneven = squares * refs.len() as f64 > UNEVEN * sum * sum;
-        if uneven && !self.one_axis { Self::BEST } else { self }
+    /// The effort where few refs are much larger than the others: a sample says nothing of them, and where they are
+    /// parted matters.
+    pub fn for_uneven(self) -> Effort {
+        Effort { samples: ALL, one_axis: false, ..self }
     }
 }
 
 /// As many samples as there are refs.
 const ALL: usize = 1 << 29;
-
-/// Above this the areas of refs are uneven.
-const UNEVEN: f64 = 64.0;
 
 /// How centres fall into bins.
 #[derive(Clone, Copy)]
@@ -49,28 +40,38 @@ struct Binning {
     lower: [f32; 4],
     scale: [f32; 4],
     bins: usize,
+    /// The last bin.
+    last: f32,
 }
+
+/// Above 2^23 the lowest bits of a float are those of an integer.
+const INTEGER: f32 = (1 << 23) as f32;
 
 impl Binning {
     fn new(centres: &Box4, count: usize, most: usize) -> Self {
         // Few refs leave most bins empty.
         let bins = (4 + count / 8).min(most);
         let scale = core::array::from_fn(|k| bins as f32 / (centres.upper[k] - centres.lower[k]));
-        Binning { lower: centres.lower, scale, bins }
+        Binning { lower: centres.lower, scale, bins, last: (bins - 1) as f32 }
     }
 
-    /// The bins on the three axes. NaN, from infinite boxes or an axis without extent, goes to bin 0:
+    /// The bins on the three axes.
+    #[inline(always)]
+    fn bins_of(&self, r: &PrimRef) -> [usize; 3] {
+        let centre = centre(r);
+        let mut at = [0.0; 4];
+        for k in 0..4 {
+            at[k] = self.place(centre[k], k);
+        }
+        [0, 1, 2].map(|k| at[k].to_bits() as usize % BINS)
+    }
+
+    /// The bin on axis `k`, above [`INTEGER`]. NaN, from infinite boxes or an axis without extent, goes to bin 0:
     /// everything is in some bin.
-    #[inline]
-    fn bins_of(&self, r: &PrimRef) -> [usize; 4] {
-        // Above 2^23 the lowest bits of a float are those of an integer.
-        const INTEGER: f32 = (1 << 23) as f32;
-        let (centre, last) = (centre(r), (self.bins - 1) as f32);
-        let bits: [u32; 4] = core::array::from_fn(|k| {
-            let at = (centre[k] - self.lower[k]) * self.scale[k] - 0.5;
-            (lesser(greater(at, 0.0), last) + INTEGER).to_bits() % BINS as u32
-        });
-        bits.map(|bin| bin as usize)
+    #[inline(always)]
+    fn place(&self, centre: f32, k: usize) -> f32 {
+        let at = (centre - self.lower[k]) * self.scale[k] - 0.5;
+        lesser(greater(at, 0.0), self.last) + INTEGER
     }
 }
 
@@ -87,9 +88,11 @@ impl Plane {
     ///
     /// Every ref is moved, left or not: a branch would be guessed wrong half the time.
     pub fn part(&self, refs: &mut [PrimRef]) -> usize {
-        let mut count = 0;
+        let (mut count, k) = (0, self.axis % 3);
+        let right = self.bin as f32 + INTEGER;
         for i in 0..refs.len() {
-            let left = self.binning.bins_of(&refs[i])[self.axis] < self.bin;
+            let Box4 { lower, upper } = &refs[i].bounds;
+            let left = self.binning.place(middle(lower[k], upper[k]), k) < right;
             refs.swap(i, count);
             count += usize::from(left);
         }
@@ -130,12 +133,18 @@ pub(crate) fn best_plane(
     let all = refs.len() < 2 * effort.samples;
     let step = if all { 1 } else { refs.len() / effort.samples };
     let sample = refs.iter().step_by(step);
-    match &mut axes[looked_at.clone()] {
-        [axis] => sample.for_each(|r| axis.add(r, binning.bins_of(r)[first])),
-        axes => sample.for_each(|r| {
-            let bins = binning.bins_of(r);
-            axes.iter_mut().zip(bins).for_each(|(axis, bin)| axis.add(r, bin));
-        }),
+    if effort.one_axis {
+        for r in sample {
+            axes[first].add(r, binning.bins_of(r)[first]);
+        }
+    } else {
+        let [x, y, z] = axes;
+        for r in sample {
+            let [a, b, c] = binning.bins_of(r);
+            x.add(r, a);
+            y.add(r, b);
+            z.add(r, c);
+        }
     }
     let mut best = (f32::INFINITY, 0, 0);
     for k in looked_at {
@@ -152,7 +161,7 @@ pub(crate) fn best_plane(
 }
 
 impl Axis {
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, r: &PrimRef, bin: usize) {
         self.bounds[bin].add(&r.bounds);
         self.counts[bin] += 1;

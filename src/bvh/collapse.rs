@@ -1,5 +1,7 @@
 //! From a binary tree to bundles and whole leaf blocks: which subtree becomes what, at the least cost.
 
+use core::ops::Range;
+
 use super::MAX_DEPTH;
 use super::fits::Corners;
 use super::split::Areas;
@@ -7,7 +9,7 @@ use super::tree::Grown;
 use crate::block::BvhNode;
 use crate::block::leaf::{SPHERES, TRIANGLES};
 use crate::math::Aabb;
-use crate::prim::{Shape, Shapes};
+use crate::prim::{AHEAD, Shape, Shapes};
 
 /// What becomes of an inner node.
 ///
@@ -52,7 +54,7 @@ pub(crate) fn choice_of(choices: &[u64], node: &BvhNode) -> Option<Choice> {
 
 /// A subtree that is decided, and what it may still be part of.
 #[derive(Clone, Copy)]
-struct Decided<const W: usize> {
+pub(super) struct Decided<const W: usize> {
     /// The least cost with 1 .. W lanes.
     cost: [f32; W],
     /// More lanes than this, or than W, change nothing: the leaves of the binary tree.
@@ -63,97 +65,125 @@ struct Decided<const W: usize> {
 
 /// What a leaf over a subtree would hold.
 #[derive(Clone, Copy)]
-enum Content {
-    Triangles {
-        count: usize,
-        corners: Corners,
-    },
-    Spheres {
-        count: usize,
-    },
+struct Content {
+    kind: Kind,
+    count: usize,
+    /// Those of triangles.
+    corners: Corners,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Triangles,
+    Spheres,
     /// Too much for one block, or both kinds.
     Much,
 }
 
-/// Writes a choice for each inner node, so that the tree of bundles costs least. `ids` are those of the
-/// tree's leaves; which triangles share vertices is seen in `shapes`.
+/// The binary tree, and what decides about it.
 ///
 /// A ray that enters a box pays 1 for the bundle or the leaf block in it, whatever that holds;
 /// boxes are entered in proportion to their area. `price` is added for each leaf block, and to each
 /// bundle in proportion to its bytes: it breaks ties, and a higher one saves memory. Leaf blocks
 /// hold at most 16 triangles over 16 vertices, or 15 spheres.
+#[derive(Clone, Copy)]
+pub(super) struct Grounds<'t> {
+    pub nodes: &'t [BvhNode],
+    /// The ids of the tree's leaves.
+    pub ids: &'t [u32],
+    pub areas: Areas,
+    pub price: f32,
+}
+
+/// What is decided and still to be part of something: the last subtree first.
 ///
 /// Pairs of children come after their parents and right subtrees after left ones, so the pairs in
-/// reverse are the tree in reverse Polish notation: no other stack is needed than that of results,
-/// which holds one for each level at most.
-///
-/// Source: \[Wald08\] for the wide tree, \[Ylitie17\], 3.1, for the dynamic program.
-pub(crate) fn choose<const W: usize>(
-    nodes: &[BvhNode],
-    ids: &[u32],
-    shapes: &mut Shapes,
-    areas: Areas,
-    price: f32,
-    choices: &mut [u64],
-) -> Option<()> {
-    let nothing = Decided::<W>::NOTHING;
-    let mut stack = [nothing; MAX_DEPTH + 2];
-    let mut pending = 0;
-    for (pair, choice) in nodes.chunks_exact(2).skip(1).zip(choices).rev() {
-        let [left, right] = pair else { return None };
-        let (mut left_leaf, mut right_leaf) = (nothing, nothing);
-        // What was decided last is left.
-        let left = if left.is_leaf() {
-            left_leaf.set_leaf(left, ids, shapes, areas, price)?;
-            &left_leaf
-        } else {
-            pending = usize::checked_sub(pending, 1)?;
-            stack.get(pending)?
-        };
-        let right = if right.is_leaf() {
-            right_leaf.set_leaf(right, ids, shapes, areas, price)?;
-            &right_leaf
-        } else {
-            pending = usize::checked_sub(pending, 1)?;
-            stack.get(pending)?
-        };
-        let (decided, chosen) = join(left, right, areas, price);
-        *choice = chosen.0;
-        *stack.get_mut(pending)? = decided;
-        pending += 1;
+/// reverse are the tree in reverse Polish notation: no other stack is needed, and it
+/// holds one result for each level at most.
+pub(super) struct Results<const W: usize> {
+    stack: [Decided<W>; MAX_DEPTH + 2],
+    pending: usize,
+}
+
+impl<const W: usize> Results<W> {
+    pub const NONE: Self = Results { stack: [Decided::NOTHING; MAX_DEPTH + 2], pending: 0 };
+
+    pub fn push(&mut self, decided: Decided<W>) -> Option<()> {
+        *self.stack.get_mut(self.pending)? = decided;
+        self.pending += 1;
+        Some(())
     }
-    Some(())
+
+    /// The one result there is.
+    pub fn only(&self) -> Option<Decided<W>> {
+        self.stack.first().copied().filter(|_| self.pending == 1)
+    }
+
+    /// Decides these pairs of children, of which pair 0 does not exist, and writes their choices. What is below them
+    /// is decided already; which triangles share vertices is seen in `shapes`.
+    pub fn decide(
+        &mut self,
+        grounds: &Grounds,
+        pairs: Range<usize>,
+        shapes: &mut Shapes,
+        choices: &mut [u64],
+    ) -> Option<()> {
+        let nodes = grounds.nodes.get(2 * pairs.start..2 * pairs.end)?;
+        let (mut left_leaf, mut right_leaf) = (Decided::NOTHING, Decided::NOTHING);
+        for (pair, choice) in nodes.chunks_exact(2).zip(choices).rev() {
+            let [left, right] = pair else { return None };
+            // What was decided last is left.
+            let left = if left.is_leaf() {
+                left_leaf.set_leaf(left, grounds, shapes)?;
+                &left_leaf
+            } else {
+                self.pending = self.pending.checked_sub(1)?;
+                self.stack.get(self.pending)?
+            };
+            let right = if right.is_leaf() {
+                right_leaf.set_leaf(right, grounds, shapes)?;
+                &right_leaf
+            } else {
+                self.pending = self.pending.checked_sub(1)?;
+                self.stack.get(self.pending)?
+            };
+            let (decided, chosen) = join(left, right, grounds);
+            *choice = chosen.0;
+            self.push(decided)?;
+        }
+        Some(())
+    }
 }
 
 impl<const W: usize> Decided<W> {
     const NOTHING: Self =
-        Decided { cost: [0.0; W], lanes: 0, aabb: Aabb::EMPTY, content: Content::Much };
+        Decided { cost: [0.0; W], lanes: 0, aabb: Aabb::EMPTY, content: Content::MUCH };
 
     /// Becomes a leaf of the binary tree.
-    fn set_leaf(
-        &mut self,
-        node: &BvhNode,
-        ids: &[u32],
-        shapes: &mut Shapes,
-        areas: Areas,
-        price: f32,
-    ) -> Option<()> {
+    fn set_leaf(&mut self, node: &BvhNode, grounds: &Grounds, shapes: &mut Shapes) -> Option<()> {
+        let Grounds { ids, areas, price, .. } = *grounds;
         let (count, is_sphere) = Grown::of(node);
         self.aabb = node.aabb();
         self.cost = [areas.of(&self.aabb) + price; W];
         self.lanes = 1;
+        self.content.count = count;
         if is_sphere {
-            self.content = Content::Spheres { count };
+            self.content.kind = Kind::Spheres;
             return Some(());
         }
+        self.content.kind = Kind::Triangles;
         let first = node.first as usize;
+        // Leaves come from the last to the first.
+        let ahead = first.saturating_sub(AHEAD)..(first + count).saturating_sub(AHEAD);
+        for id in ids.get(ahead).into_iter().flatten() {
+            shapes.prefetch(*id);
+        }
         let triangles =
             ids.get(first..first + count)?.iter().filter_map(|id| match shapes.get(*id)? {
                 Shape::Triangle(triangle) => Some(triangle),
                 Shape::Sphere { .. } => None,
             });
-        let corners = Corners::of(triangles);
-        self.content = Content::Triangles { count, corners };
+        self.content.corners.become_those_of(triangles);
         Some(())
     }
 }
@@ -161,18 +191,14 @@ impl<const W: usize> Decided<W> {
 fn join<const W: usize>(
     left: &Decided<W>,
     right: &Decided<W>,
-    areas: Areas,
-    price: f32,
+    &Grounds { areas, price, .. }: &Grounds,
 ) -> (Decided<W>, Choice) {
     let mut aabb = left.aabb;
     aabb.add(&right.aabb);
     let area = areas.of(&aabb);
-    let content = together(&left.content, &right.content);
+    let content = left.content.with(&right.content);
     let (shared, split) = share(left, right);
-    let block = match content {
-        Content::Much => f32::INFINITY,
-        _ => area + price,
-    };
+    let block = if content.kind == Kind::Much { f32::INFINITY } else { area + price };
     let bundle = area + price * bundle_price(W) + shared[W - 1];
     let is_leaf = block <= bundle;
     let one = if is_leaf { block } else { bundle };
@@ -208,22 +234,24 @@ fn share<const W: usize>(left: &Decided<W>, right: &Decided<W>) -> ([f32; W], [u
     (cost, split)
 }
 
-/// What one block would hold of both, if it can.
-fn together(a: &Content, b: &Content) -> Content {
-    match (a, b) {
-        (
-            Content::Triangles { count: n, corners },
-            Content::Triangles { count: m, corners: others },
-        ) if n + m <= TRIANGLES => {
-            let mut corners = *corners;
-            if corners.merge(others) {
-                return Content::Triangles { count: n + m, corners };
-            }
-            Content::Much
+impl Content {
+    const MUCH: Content = Content { kind: Kind::Much, count: 0, corners: Corners::NONE };
+
+    /// What one block would hold of both, if it can.
+    fn with(&self, other: &Content) -> Content {
+        let count = self.count + other.count;
+        let most = match self.kind {
+            Kind::Triangles => TRIANGLES,
+            Kind::Spheres => SPHERES,
+            Kind::Much => 0,
+        };
+        if self.kind != other.kind || count > most {
+            return Content::MUCH;
         }
-        (Content::Spheres { count: n }, Content::Spheres { count: m }) if n + m <= SPHERES => {
-            Content::Spheres { count: n + m }
+        let mut both = Content { count, ..*self };
+        if self.kind == Kind::Triangles && !both.corners.merge(&other.corners) {
+            both.kind = Kind::Much;
         }
-        _ => Content::Much,
+        both
     }
 }

@@ -34,7 +34,7 @@ impl Plan {
         let (triangles, spheres) = (census.triangle_count, census.sphere_count);
         let prims = census.hittable();
         let mixed = triangles > 0 && spheres > 0;
-        let leaves = leaf_budget(prims as usize, mixed, full);
+        let leaves = leaf_budget(prims as usize, mixed, LEAF_MAX, full);
         let growing = Counts {
             geometries: survey.geometry_count,
             prim_ids: prims,
@@ -94,7 +94,7 @@ fn grow_tree(
         plan.growing.parts_mut(bytes)?;
     geometries(scene, table);
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
-    gather(scene, census, refs);
+    gather(scene, census, 1, how.caller, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
     let limits =
         Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false, effort: how.effort };
@@ -116,7 +116,7 @@ fn pack_leaves(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]
         counts.parts_mut(bytes)?;
     let (triangles, spheres) = prim_ids.split_at(census.triangle_count as usize);
     let (mut triangles, mut spheres) = (triangles.iter(), spheres.iter());
-    let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    let mut packer = Packer::new(triangle_blocks, sphere_blocks, 0, census.triangle_count);
     let mut shapes = Shapes::new(scene, geometries);
     for_each_leaf(nodes, |node| {
         let (count, is_sphere) = Grown::of(node);

@@ -189,13 +189,13 @@ mod tests {
     use super::*;
     use crate::bvh::bins::Effort;
     use crate::bvh::branch::grow;
-    use crate::bvh::collapse::choose;
+    use crate::bvh::choose::choose;
+    use crate::bvh::collapse::Grounds;
     use crate::bvh::refs::PrimRef;
     use crate::bvh::split::Areas;
     use crate::bvh::tree::Limits;
     use crate::caller::Caller;
     use crate::math::Aabb;
-    use crate::prim::Shapes;
     use crate::scene::Scene;
     use std::vec::Vec;
 
@@ -293,8 +293,8 @@ mod tests {
     fn chosen<const W: usize>(nodes: &[BvhNode]) -> f32 {
         let mut choices = [0; LEAVES - 1];
         let scene = Scene::new(&[], &[]);
-        let shapes = &mut Shapes::new(&scene, &[]);
-        choose::<W>(nodes, &[], shapes, areas(), PRICE, &mut choices).expect("a tree");
+        let grounds = Grounds { nodes, ids: &[], areas: areas(), price: PRICE };
+        choose::<W>(&grounds, &scene, &[], &Caller::new(None, None), &mut choices).expect("a tree");
         let area = |node: u32| areas().of(&nodes[node as usize].aabb());
         let mut sum = area(0) + PRICE * (28 * W) as f32 / 256.0;
         Chosen { nodes, choices: &choices, ids: &[] }

@@ -12,23 +12,17 @@ pub(crate) struct Corners {
 impl Corners {
     pub const NONE: Corners = Corners { vertices: [[0.0; TRIANGLES]; 3], count: 0 };
 
-    /// Those of a few triangles, five at the most, which always fit.
-    pub fn of(triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> Corners {
-        let mut all = Corners::NONE;
-        for (i, vertex) in triangles.flatten().take(TRIANGLES).enumerate() {
-            all.set(i, vertex);
-            all.count = i + 1;
-        }
-        // All are there before the first is looked for: what was just written is slow to search.
-        let mut distinct = Corners::NONE;
-        for i in 0..all.count {
-            let vertex = all.get(i);
-            if all.find(i, &vertex) == 0 {
-                distinct.set(distinct.count, vertex);
-                distinct.count += 1;
+    /// Becomes those of a few triangles, which have 16 at the most. In place, as what was just written is slow to copy.
+    pub fn become_those_of(&mut self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) {
+        self.count = 0;
+        for vertex in triangles.flatten() {
+            // One by one: what was just written is slow to search with vectors, too.
+            let known = |i| self.get(i).map(f32::to_bits) == vertex.map(f32::to_bits);
+            if !(0..self.count).any(known) {
+                self.set(self.count, vertex);
+                self.count += 1;
             }
         }
-        distinct
     }
 
     /// Adds the vertices of `other`; false when there would be more than 16.
@@ -88,21 +82,19 @@ mod tests {
     fn sixteen_vertices_fit_and_equal_bits_count_once() {
         let vertex = |i: usize| [i as f32, 0.0, 1.0];
         let fifteen: [_; 15] = core::array::from_fn(vertex);
-        let mut corners = Corners::of(triangles(&fifteen));
-        let one = |extra| Corners::of(triangles(&[extra, vertex(3), vertex(4)]));
+        let of = |vertices: &[[f32; 3]]| {
+            let mut corners = Corners::NONE;
+            corners.become_those_of(triangles(vertices));
+            corners
+        };
+        let mut corners = of(&fifteen);
+        let one = |extra| of(&[extra, vertex(3), vertex(4)]);
         assert!(corners.merge(&corners.clone()) && corners.count == 15);
         assert!(corners.merge(&one(vertex(15))) && corners.count == 16);
         assert!(corners.merge(&one(vertex(15))), "known");
         assert!(!corners.clone().merge(&one([3.0, -0.0, 1.0])), "other bits");
         assert!(!corners.clone().merge(&one([3.0, 0.0, 2.0])), "the seventeenth");
-        let twice = Corners::of(triangles(&[
-            vertex(1),
-            vertex(2),
-            vertex(3),
-            vertex(3),
-            vertex(1),
-            vertex(4),
-        ]));
+        let twice = of(&[1, 2, 3, 3, 1, 4].map(vertex));
         assert_eq!(twice.count, 4);
     }
 }

@@ -3,9 +3,11 @@
 
 mod bins;
 mod branch;
+mod choose;
 mod collapse;
 mod compact;
 mod emit;
+mod fill;
 mod fits;
 mod refs;
 mod split;

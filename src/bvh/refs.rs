@@ -2,22 +2,26 @@
 
 #![allow(unsafe_code, reason = "a promise about the layout drawn here")]
 
-use super::split::Box4;
+use core::ops::Range;
+
+use super::split::{Areas, Box4};
 use crate::block::Census;
+use crate::caller::{Caller, PARTS};
 use crate::math::Aabb;
-use crate::prim::{Shape, for_each_prim_in};
+use crate::prim::{GRAIN, Prim, Shape, for_each_prim_in};
+
 use crate::scene::Scene;
 use crate::storage::Plain;
 
-/// A primitive as the builder sees it.
+/// A primitive as the builder sees it, or a strip: triangles with consecutive ids, each with an edge of the one before.
 ///
 /// ```text
-/// byte 0       12   16      28          32
-///      | lower | id | upper | is sphere |
+/// byte 0       12   16      28      32
+///      | lower | id | upper | count |
 /// ```
 ///
-/// The id stands in the fourth lane of the box, below `2^30` and with that bit set. So all lanes are
-/// zero or normal floats: computing with subnormal ones is slow.
+/// The id stands in the fourth lane of the box, below `2^30` and with that bit set; the count is a float, negative for
+/// spheres. So all lanes are zero or normal floats: computing with subnormal ones is slow.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub(crate) struct PrimRef {
@@ -29,15 +33,12 @@ const _: () = assert!(size_of::<PrimRef>() == 32);
 unsafe impl Plain for PrimRef {}
 
 impl PrimRef {
-    /// Where the id is among the words of a ref.
-    pub const ID: usize = 3;
-
     /// Set in that word.
     const NORMAL: u32 = 1 << 30;
 
-    /// The id in that word.
-    pub fn id_of(word: u32) -> u32 {
-        word & !Self::NORMAL
+    /// The first id and the number of ids of the ref that has these words.
+    pub fn ids_of(words: &[u32; 8]) -> [u32; 2] {
+        [words[3] & !Self::NORMAL, f32::from_bits(words[7]).abs() as u32]
     }
 
     pub fn new(id: u32, aabb: &Aabb, sphere: bool) -> Self {
@@ -45,27 +46,204 @@ impl PrimRef {
             // -0 becomes +0.
             [x + 0.0, y + 0.0, z + 0.0, f32::from_bits(word)]
         };
-        let sphere = if sphere { 1.0f32.to_bits() } else { 0 };
-        let (lower, upper) = (lane(aabb.lower, id | Self::NORMAL), lane(aabb.upper, sphere));
+        let count = if sphere { -1.0f32 } else { 1.0 };
+        let (lower, upper) =
+            (lane(aabb.lower, id | Self::NORMAL), lane(aabb.upper, count.to_bits()));
         PrimRef { bounds: Box4 { lower, upper } }
     }
 
     pub fn id(&self) -> u32 {
-        Self::id_of(self.bounds.lower[3].to_bits())
+        self.bounds.lower[3].to_bits() & !Self::NORMAL
     }
 
     pub fn is_sphere(&self) -> bool {
-        self.bounds.upper[3].to_bits() != 0
+        self.bounds.upper[3] < 0.0
+    }
+
+    /// The number of primitives: their ids are consecutive.
+    pub fn count(&self) -> usize {
+        self.bounds.upper[3].abs() as usize
+    }
+
+    /// Takes in the triangle of the next id, if the area of both together is no more than the sum of each.
+    fn extend(&mut self, next: &PrimRef, areas: Areas) -> bool {
+        let mut both = self.bounds;
+        both.add(&next.bounds);
+        let area = |bounds: &Box4| areas.of_finite(bounds);
+        let pays = area(&both) <= 1.2 * (area(&self.bounds) + area(&next.bounds));
+        if pays {
+            both.lower[3] = self.bounds.lower[3];
+            both.upper[3] = self.bounds.upper[3] + 1.0;
+            self.bounds = both;
+        }
+        pays
     }
 }
 
-/// Writes a ref for each primitive that can be hit.
-pub(crate) fn gather(scene: &Scene, census: &Census, refs: &mut [PrimRef]) {
-    let mut free = refs.iter_mut();
-    for_each_prim_in(scene, 0..u32::MAX, census.ignored_count == 0, |prim| {
-        if let Some(r) = free.next() {
-            let sphere = matches!(prim.shape, Shape::Sphere { .. });
-            *r = PrimRef::new(prim.id, &prim.shape.aabb(), sphere);
+/// Writes a ref for each primitive that can be hit, or for up to `strip` triangles; returns the number of refs.
+pub(crate) fn gather(
+    scene: &Scene,
+    census: &Census,
+    strip: usize,
+    caller: &Caller,
+    refs: &mut [PrimRef],
+) -> usize {
+    let (all, sound) = (census.prim_limit as usize, census.ignored_count == 0);
+    let strips = (strip > 1).then(|| (strip, Areas::new(&census.bounds)));
+    let rooms = caller.map_parts(all, caller.part_size(all, GRAIN), |ids| {
+        let room = if sound || ids.len() == all { ids.len() } else { hittable(scene, &ids) };
+        (ids, room)
+    });
+    let mut parts = [const { None }; PARTS];
+    let mut free = &mut *refs;
+    for (part, (ids, room)) in parts.iter_mut().zip(rooms) {
+        let room = room.min(free.len());
+        let (refs, rest) = core::mem::take(&mut free).split_at_mut(room);
+        free = rest;
+        *part = Some(Part { ids, refs, count: 0 });
+    }
+    caller.for_each(&mut parts, |part| {
+        if let Some(part) = part {
+            part.gather(scene, sound, strips);
         }
     });
+    let sizes = parts.map(|part| part.map_or((0, 0), |part| (part.refs.len(), part.count)));
+    let (mut start, mut end) = (0, 0);
+    for (room, count) in sizes {
+        if start > end {
+            refs.copy_within(start..start + count, end);
+        }
+        start += room;
+        end += count;
+    }
+    end
+}
+
+/// How many of these can be hit.
+fn hittable(scene: &Scene, ids: &Range<usize>) -> usize {
+    let mut count = 0;
+    for_each_prim_in(scene, ids.start as u32..ids.end as u32, false, |_| count += 1);
+    count
+}
+
+/// The refs of consecutive ids.
+struct Part<'r> {
+    ids: Range<usize>,
+    refs: &'r mut [PrimRef],
+    count: usize,
+}
+
+impl Part<'_> {
+    /// Writes the refs. With `strips`, up to so many triangles go as one, but never across a multiple of [`GRAIN`], so that
+    /// it does not matter where parts begin.
+    fn gather(&mut self, scene: &Scene, sound: bool, strips: Option<(usize, Areas)>) {
+        let ids = self.ids.start as u32..self.ids.end as u32;
+        // The last triangle.
+        let mut last: Option<(u32, [[f32; 3]; 3])> = None;
+        for_each_prim_in(scene, ids, sound, |Prim { id, shape }| {
+            let new = PrimRef::new(id, &shape.aabb(), matches!(shape, Shape::Sphere { .. }));
+            let (Some(strips), Shape::Triangle(corners)) = (strips, shape) else {
+                return self.push(new);
+            };
+            let follows = last.is_some_and(|(one, other)| {
+                one + 1 == id
+                    && !(id as usize).is_multiple_of(GRAIN)
+                    && share_edge(&other, &corners)
+            });
+            if !(follows && self.extend(&new, strips)) {
+                self.push(new);
+            }
+            last = Some((id, corners));
+        });
+    }
+
+    #[inline(always)]
+    fn push(&mut self, new: PrimRef) {
+        if let Some(r) = self.refs.get_mut(self.count) {
+            *r = new;
+            self.count += 1;
+        }
+    }
+
+    /// Extends the last ref by `new`, if that pays.
+    #[inline(always)]
+    fn extend(&mut self, new: &PrimRef, (most, areas): (usize, Areas)) -> bool {
+        let last = self.count.checked_sub(1).and_then(|i| self.refs.get_mut(i));
+        last.is_some_and(|last| last.count() < most && last.extend(new, areas))
+    }
+}
+
+/// Whether two vertices of one are vertices of the other, to the bit.
+#[inline]
+fn share_edge(a: &[[f32; 3]; 3], b: &[[f32; 3]; 3]) -> bool {
+    let mut shared = 0;
+    for [x, y, z] in a.map(|v| v.map(f32::to_bits)) {
+        for v in b {
+            let differs = (v[0].to_bits() ^ x) | (v[1].to_bits() ^ y) | (v[2].to_bits() ^ z);
+            shared += u32::from(differs == 0);
+        }
+    }
+    shared >= 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::caller::Threads;
+    use crate::prim::survey;
+    use crate::scene::Mesh;
+    use std::vec::Vec;
+
+    /// Three tasks at once, one after the other.
+    struct Three;
+
+    impl Threads for Three {
+        fn worker_count(&self) -> usize {
+            3
+        }
+
+        fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+            (0..count).rev().for_each(task);
+        }
+    }
+
+    /// The first id and the number of triangles of each ref over triangles along a band.
+    fn strips(indices: &[[u32; 3]], strip: usize, caller: &Caller) -> Vec<[usize; 2]> {
+        let vertices: Vec<_> = (0..20_000).map(|i| [(i / 2) as f32, (i % 2) as f32, 0.0]).collect();
+        let meshes = [Mesh::indexed(&vertices, indices)];
+        let scene = Scene::new(&meshes, &[]);
+        let census = Census::take(&scene, &survey(&scene).unwrap(), caller).unwrap();
+        let mut refs = std::vec![PrimRef::new(0, &Aabb::EMPTY, false); indices.len()];
+        let count = gather(&scene, &census, strip, caller, &mut refs);
+        refs[..count].iter().map(|r| [r.id() as usize, r.count()]).collect()
+    }
+
+    #[test]
+    fn strips_are_as_long_as_they_may_be_and_end_with_the_grain() {
+        let band: Vec<_> = (0..10_000).map(|i| [i, i + 1, i + 2]).collect();
+        let alone = Caller::new(None, None);
+        let found = strips(&band[..7], 3, &alone);
+        assert_eq!(found, [[0, 3], [3, 3], [6, 1]]);
+        assert_eq!(strips(&band[..3], 1, &alone), [[0, 1], [1, 1], [2, 1]]);
+        let apart: Vec<_> = band.iter().step_by(2).copied().collect();
+        assert!(
+            strips(&apart, 4, &alone).iter().all(|[_, count]| *count == 1),
+            "one common vertex"
+        );
+        let found = strips(&band, 3, &alone);
+        assert!(found.contains(&[GRAIN - 1, 1]) && found.contains(&[GRAIN, 3]));
+        assert!(strips(&band, 3, &Caller::new(Some(&Three), None)) == found, "with threads");
+    }
+
+    #[test]
+    fn what_cannot_be_hit_is_in_no_strip() {
+        let mut band: Vec<_> = (0..10_000).map(|i| [i, i + 1, i + 2]).collect();
+        for i in [1, 4000, 9000] {
+            band[i] = [7, 7, 8];
+        }
+        let found = strips(&band, 4, &Caller::new(None, None));
+        assert_eq!(found[..2], [[0, 1], [2, 4]]);
+        assert_eq!(found.iter().map(|[_, count]| count).sum::<usize>(), band.len() - 3);
+        assert!(strips(&band, 4, &Caller::new(Some(&Three), None)) == found, "with threads");
+    }
 }

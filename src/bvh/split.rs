@@ -108,8 +108,18 @@ impl Extent {
 
 /// A quarter of the sum of the corners, which is half the centre: it cannot overflow, and neither
 /// can the difference of two. NaN for boxes that are infinite both ways.
-#[inline]
+#[inline(always)]
 pub(super) fn centre(r: &PrimRef) -> [f32; 4] {
     let Box4 { lower, upper } = &r.bounds;
-    core::array::from_fn(|k| 0.25 * lower[k] + 0.25 * upper[k])
+    let mut centre = [0.0; 4];
+    for k in 0..4 {
+        centre[k] = middle(lower[k], upper[k]);
+    }
+    centre
+}
+
+/// Half the middle of two coordinates.
+#[inline(always)]
+pub(super) fn middle(lower: f32, upper: f32) -> f32 {
+    0.25 * lower + 0.25 * upper
 }

@@ -9,17 +9,18 @@ use super::sweep::{FEW, sweep};
 use crate::block::BvhNode;
 use crate::math::Aabb;
 
-/// A leaf that has no lanes yet: `first` is its first ref; `lanes` holds the number of its refs, and
-/// their kind in bit 8.
+/// A leaf that has no lanes yet: `lanes` holds the number of its primitives, and their kind in bit 8; `first` is, in
+/// the end, the number of primitives in the leaves before.
 pub(crate) struct Grown;
 
 impl Grown {
-    fn leaf(bounds: &Aabb, first: usize, refs: &[PrimRef]) -> BvhNode {
+    fn leaf(bounds: &Aabb, refs: &[PrimRef]) -> BvhNode {
         let sphere = u32::from(refs.first().is_some_and(PrimRef::is_sphere));
-        BvhNode { lanes: refs.len() as u32 | sphere << 8, ..BvhNode::inner(bounds, first as u32) }
+        let count: usize = refs.iter().map(PrimRef::count).sum();
+        BvhNode { lanes: count as u32 | sphere << 8, ..BvhNode::inner(bounds, 0) }
     }
 
-    /// The number of refs, and whether they are spheres.
+    /// The number of primitives, and whether they are spheres.
     pub fn of(node: &BvhNode) -> (usize, bool) {
         ((node.lanes & 0xFF) as usize, node.lanes >> 8 != 0)
     }
@@ -30,7 +31,7 @@ impl Grown {
 pub(crate) struct Limits {
     /// Leaves at most.
     pub leaves: usize,
-    /// Primitives of a leaf at most; 5 or 6.
+    /// Refs of a leaf at most; 4 to 6.
     pub leaf_max: usize,
     /// Whether there are triangles and spheres: a leaf is of one kind.
     pub mixed: bool,
@@ -64,23 +65,24 @@ pub(super) struct Split {
     sides: [Extent; 2],
 }
 
-/// The fewest leaves that `count` primitives can always be brought into by halving, and by parting
+/// The fewest leaves that `count` refs can always be brought into by halving, and by parting
 /// kinds at the end when both occur.
 ///
-/// By induction: what is at most a leaf is one leaf, or two of different kinds; what is more, six at
-/// least, has halves of at least three, and `count / 3` is superadditive.
-fn fewest_leaves(count: usize, mixed: bool) -> usize {
+/// By induction: what is at most a leaf is one leaf, or two of different kinds; what is more, `leaf_max + 1` at
+/// least, has halves of at least `half`, the lesser half of that, and `count / half` is superadditive.
+fn fewest_leaves(count: usize, mixed: bool, leaf_max: usize) -> usize {
+    let half = leaf_max.div_ceil(2);
     match (count, mixed) {
         (0 | 1, _) => count,
-        (_, false) => (count / 3).max(1),
-        (_, true) => (2 * count / 3).max(2),
+        (_, false) => (count / half).max(1),
+        (_, true) => (2 * count / half).max(2),
     }
 }
 
-/// The leaves that a tree over `count` primitives may have: `full` is what good trees want, the
+/// The leaves that a tree over `count` refs may have: `full` is what good trees want, the
 /// other bound the least that works.
-pub(crate) fn leaf_budget(count: usize, mixed: bool, full: bool) -> usize {
-    let least = fewest_leaves(count, mixed);
+pub(crate) fn leaf_budget(count: usize, mixed: bool, leaf_max: usize, full: bool) -> usize {
+    let least = fewest_leaves(count, mixed, leaf_max);
     let wanted = if mixed { count } else { count.div_ceil(2) };
     if full { wanted.max(least) } else { least }
 }
@@ -116,7 +118,7 @@ impl Splitter<'_> {
             let split = self.part(range, &task, &mut bins);
             let aabb = task.extent.bounds.aabb();
             let node = match &split {
-                None => Grown::leaf(&aabb, task.first, range),
+                None => Grown::leaf(&aabb, range),
                 Some(_) => BvhNode::inner(&aabb, used),
             };
             match task.node.checked_sub(whole.pairs) {
@@ -172,7 +174,7 @@ impl Splitter<'_> {
             return None;
         }
         let least = |left_count: usize| {
-            [fewest_leaves(left_count, mixed), fewest_leaves(count - left_count, mixed)]
+            [left_count, count - left_count].map(|n| fewest_leaves(n, mixed, leaf_max))
         };
         let pays = |work: f32| {
             let area = areas.of(&task.extent.bounds.aabb());
@@ -224,20 +226,20 @@ mod tests {
 
     #[test]
     fn budgets_are_enough_for_halving() {
-        for mixed in [false, true] {
+        for (mixed, leaf_max) in [4, 5, 6].into_iter().flat_map(|n| [(false, n), (true, n)]) {
             for count in 2..2000 {
-                let half = count / 2;
-                let halves = fewest_leaves(half, mixed) + fewest_leaves(count - half, mixed);
+                let fewest = |count| fewest_leaves(count, mixed, leaf_max);
+                let halves = fewest(count / 2) + fewest(count - count / 2);
                 let done = if mixed { 2 } else { 1 };
-                let least = if count < 6 { done } else { halves };
-                assert!(least <= fewest_leaves(count, mixed), "{count} {mixed}");
+                let least = if count <= leaf_max { done } else { halves };
+                assert!(least <= fewest(count), "{count} {mixed} {leaf_max}");
             }
         }
     }
 
     #[test]
     fn the_most_primitives_fit_the_depth() {
-        assert!(levels_to_halve(1 << 30, 5) < MAX_DEPTH - 32);
+        assert!(levels_to_halve(1 << 30, 4) < MAX_DEPTH - 32);
         assert_eq!((levels_to_halve(5, 5), levels_to_halve(6, 5)), (1, 2));
         assert_eq!((levels_to_halve(6, 6), levels_to_halve(7, 6)), (1, 2));
     }
@@ -270,7 +272,7 @@ mod tests {
         for ratio in [1.1f64, 1.3, 1.5, 2.0, 3.0, 4.0, 8.0] {
             for (leaf_max, deep) in [(5, true), (6, false)] {
                 let count = (240.0 / ratio.log2()) as usize;
-                let leaves = leaf_budget(count, false, true);
+                let leaves = leaf_budget(count, false, leaf_max, true);
                 let mut refs = series(count, ratio);
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
                 let limits =

@@ -2,22 +2,30 @@
 
 use super::How;
 use super::branch::grow;
-use super::collapse::choose;
+use super::choose::choose;
+use super::collapse::Grounds;
 use super::compact;
-use super::emit::{BEGINS, Chosen, Sizes};
+use super::emit::{Chosen, Sizes};
+use super::fill::pack;
 use super::refs::{PrimRef, gather};
 use super::split::Areas;
 use super::tree::{Limits, leaf_budget};
 use crate::block::bundle::{Bundle, LANE};
-use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
+use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
+use crate::caller::Caller;
 use crate::error::BuildError;
-use crate::prim::{Packer, Shapes, Survey, geometries};
+use crate::prim::{Survey, geometries};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT, Plain};
 
 /// Primitives of a leaf of the binary tree at most: any five triangles fit into a block.
 const LEAF_MAX: usize = TRIANGLES_AT_LEAST;
+
+/// Strips of a leaf at most, of `strip` triangles each: such a strip has two vertices more than triangles.
+fn leaf_max(strip: usize) -> usize {
+    if strip == 1 { LEAF_MAX } else { TRIANGLES / (strip + 2) }
+}
 
 /// Where the scratch lies while the tree grows: behind all that is finished, at the end of the
 /// memory.
@@ -42,7 +50,7 @@ impl Places {
         let prims = census.hittable() as usize;
         // More leaves, a half of the primitives or all, made no ray faster: the collapse puts them
         // together again.
-        let leaves = leaf_budget(prims, mixed, false);
+        let leaves = leaf_budget(prims, mixed, LEAF_MAX, false);
         let nodes = (size / ALIGNMENT * ALIGNMENT)
             .checked_sub(leaves.checked_mul(2 * size_of::<BvhNode>())?)?;
         let refs = nodes.checked_sub(prims.checked_mul(size_of::<PrimRef>())?)?;
@@ -136,13 +144,13 @@ where
     let whole = areas.of(&census.bounds);
     let mean = whole / prims as f32;
     for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
-        let sizes = scratch.choose::<W>(scene, survey, areas, price, bytes)?;
+        let sizes = scratch.choose::<W>(scene, survey, areas, price, how.caller, bytes)?;
         let counts = counts(survey, census, &sizes, W as u32);
         let at = counts.offsets()?;
         if at.words <= scratch.choices && at.end <= bytes.len() {
             how.caller.done(0.85)?;
             scratch.emit::<W>(census, &counts, bytes)?;
-            pack(scene, census, &counts, bytes)?;
+            pack(scene, census.triangle_count as usize, counts.parts_mut(bytes)?, how.caller)?;
             return counts.seal(KIND_BVH, W as u32, census, bytes);
         }
     }
@@ -164,17 +172,37 @@ fn grow_tree(
     let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
     let refs = storage::view_mut::<PrimRef>(front, places.refs, prims)?;
-    gather(scene, census, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
+    let mut strip = if mixed { 1 } else { how.effort.strip };
+    let (ref_count, leaves) = loop {
+        let ref_count = gather(scene, census, strip, how.caller, refs);
+        let leaves = leaf_budget(ref_count, mixed, leaf_max(strip), false);
+        // Where strips are shorter than they may be, there may be more leaves than room for them.
+        if leaves <= places.leaves || strip == 1 {
+            break (ref_count, leaves);
+        }
+        strip /= 2;
+    };
+    let refs = refs.get_mut(..ref_count)?;
     let limits =
-        Limits { leaves: places.leaves, leaf_max: LEAF_MAX, mixed, deep: true, effort: how.effort };
+        Limits { leaves, leaf_max: leaf_max(strip), mixed, deep: true, effort: how.effort };
     let count = grow(nodes, refs, &limits, how.caller)?;
-    // From the last on, each id goes to the end of the refs' place, onto refs that are done.
-    let words = storage::view_mut::<u32>(front, places.refs, 8 * prims)?;
-    for i in (0..prims).rev() {
-        words[7 * prims + i] = PrimRef::id_of(words[8 * i + PrimRef::ID]);
-    }
+    spread_ids(storage::view_mut::<u32>(front, places.refs, 8 * prims)?, ref_count)?;
     Some(count)
+}
+
+/// From the last on, the ids of each ref go to the end of the refs' place, onto refs that are done.
+fn spread_ids(words: &mut [u32], ref_count: usize) -> Option<()> {
+    let mut end = words.len();
+    for at in (0..8 * ref_count).step_by(8).rev() {
+        let [id, count] = PrimRef::ids_of(words.get(at..at + 8)?.try_into().ok()?);
+        let start = end.checked_sub(count as usize)?;
+        for (word, id) in words.get_mut(start..end)?.iter_mut().zip(id..) {
+            *word = id;
+        }
+        end = start;
+    }
+    Some(())
 }
 
 /// The tree, its choices and the ids, at the end of the memory.
@@ -202,6 +230,7 @@ impl Scratch {
         survey: &Survey,
         areas: Areas,
         price: f32,
+        caller: &Caller,
         bytes: &mut [u8],
     ) -> Option<Sizes> {
         let (front, tail) = bytes.split_at_mut_checked(self.ids)?;
@@ -211,7 +240,8 @@ impl Scratch {
         let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
         let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
         let geometries = table.parts_mut(front)?.geometries;
-        choose::<W>(nodes, ids, &mut Shapes::new(scene, geometries), areas, price, choices)?;
+        let grounds = Grounds { nodes, ids, areas, price };
+        choose::<W>(&grounds, scene, geometries, caller, choices)?;
         Chosen { nodes, choices, ids }.sizes::<W>()
     }
 
@@ -230,22 +260,6 @@ impl Scratch {
         let bundles = storage::view_mut::<Bundle<W>>(bundles, 0, count)?;
         chosen.emit(bundles, prim_ids, census.triangle_count as usize)
     }
-}
-
-/// Packs the leaf blocks in the order of the ids and takes the marks off them.
-fn pack(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Option<()> {
-    let PartsMut { geometries, prim_ids, sphere_blocks, triangle_blocks, .. } =
-        counts.parts_mut(bytes)?;
-    let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
-    let mut shapes = Shapes::new(scene, geometries);
-    for id in prim_ids {
-        if *id & BEGINS != 0 {
-            packer.close();
-        }
-        *id &= !BEGINS;
-        packer.push(&shapes.get(*id)?)?;
-    }
-    (packer.triangle_block_count() == counts.triangle_blocks as usize).then_some(())
 }
 
 const _: () = assert!(SPHERES >= LEAF_MAX);

@@ -99,6 +99,9 @@ struct Elements<'a, T> {
     memory: PhantomData<&'a [T]>,
 }
 
+// SAFETY: elements are only read, by copying them, and nobody writes to them during `'a`.
+unsafe impl<T> Sync for Elements<'_, T> {}
+
 impl<'a, T: Growing> Elements<'a, T> {
     /// # Safety
     ///

@@ -191,7 +191,7 @@ pub struct RtBuildOptions {
     pub worker_count: u32,
     /// Handed to the two calls below.
     pub user: *mut c_void,
-    /// Or null: all is done on the calling thread. Speeds up the tree of a BVH.
+    /// Or null: all is done on the calling thread. Speeds up the build of a BVH, and the check of its scene.
     pub parallel_for: RtParallelFor,
     /// Or null.
     pub progress: RtProgress,

@@ -58,7 +58,7 @@ fn pack(
     let (triangles, spheres) = prim_ids.split_at_mut(census.triangle_count as usize);
     sort_by_cell(scene, head, words, triangles, |shape| matches!(shape, Shape::Triangle(_)));
     sort_by_cell(scene, head, words, spheres, |shape| matches!(shape, Shape::Sphere { .. }));
-    let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    let mut packer = Packer::new(triangle_blocks, sphere_blocks, 0, census.triangle_count);
     for id in triangles.iter().chain(spheres.iter()) {
         packer.push(&shape(scene, table, *id)?)?;
     }

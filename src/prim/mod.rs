@@ -5,7 +5,8 @@ mod pack;
 mod validate;
 
 pub(crate) use gather::{
-    Shape, Shapes, Survey, for_each_prim, for_each_prim_in, geometries, shape, survey,
+    AHEAD, GRAIN, Prim, Shape, Shapes, Survey, for_each_prim, for_each_prim_in, geometries, shape,
+    survey,
 };
 pub(crate) use pack::Packer;
 pub(crate) use validate::leaves_are_sound;

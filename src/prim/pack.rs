@@ -33,15 +33,16 @@ struct Fill {
 }
 
 impl<'b> Packer<'b> {
-    /// Packs into these blocks. The ids of triangles start at entry 0 of `prim_ids`, those of
+    /// Packs into these blocks. The ids of triangles start at entry `first_triangle` of `prim_ids`, those of
     /// spheres at entry `first_sphere`.
     pub fn new(
         triangle_blocks: &'b mut [TriangleBlock],
         sphere_blocks: &'b mut [SphereBlock],
+        first_triangle: u32,
         first_sphere: u32,
     ) -> Self {
         let spheres = Fill { next_id: first_sphere, ..Fill::default() };
-        let triangles = Fill::default();
+        let triangles = Fill { next_id: first_triangle, ..Fill::default() };
         Packer { triangle_blocks, sphere_blocks, triangles, spheres, numbers: Numbers::NONE }
     }
 
@@ -175,7 +176,7 @@ mod tests {
     #[test]
     fn blocks_of_separate_triangles_hold_five() {
         let mut blocks = [TriangleBlock::EMPTY; 4];
-        let mut packer = Packer::new(&mut blocks, &mut [], 0);
+        let mut packer = Packer::new(&mut blocks, &mut [], 0, 0);
         let places: [_; 16] = core::array::from_fn(|i| packer.push(&triangle(3.0 * i as f32)));
         assert!(places.iter().all(Option::is_some));
         assert_eq!(packer.triangle_block_count(), 4);
@@ -188,7 +189,7 @@ mod tests {
     #[test]
     fn shared_vertices_are_stored_once() {
         let mut blocks = [TriangleBlock::EMPTY; 1];
-        let mut packer = Packer::new(&mut blocks, &mut [], 0);
+        let mut packer = Packer::new(&mut blocks, &mut [], 0, 0);
         for _ in 0..16 {
             assert!(packer.push(&triangle(0.0)).is_some());
         }
@@ -198,7 +199,7 @@ mod tests {
     #[test]
     fn a_leaf_may_straddle_two_blocks() {
         let mut blocks = [TriangleBlock::EMPTY; 2];
-        let mut packer = Packer::new(&mut blocks, &mut [], 0);
+        let mut packer = Packer::new(&mut blocks, &mut [], 0, 0);
         let leaf = |n: usize| (0..n).map(move |i| triangle(3.0 * (i + 10 * n) as f32));
         let first = packer.push_leaf(leaf(3)).expect("room");
         let second = packer.push_leaf(leaf(6)).expect("room");
