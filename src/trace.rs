@@ -6,7 +6,10 @@ use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
-use crate::query::{Any, Closest, Decide, Filter, Locate, Meets, Query, Watch, geometry_of};
+use crate::block::leaf::Place;
+use crate::query::{
+    Any, Closest, Decide, Filter, Locate, Meets, Query, TriangleLane, Watch, geometry_of,
+};
 use crate::ray::{Hit, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
@@ -26,6 +29,18 @@ pub(crate) trait Question {
         query: &mut Self::Query,
         ended: bool,
     ) -> Self::Answer;
+
+    /// Whether it leaves no primitive out.
+    fn sees_all(&self) -> bool;
+
+    /// The answer for a ray that surely meets the triangle within its limits, and whatever else it asks for after it; `None` when that takes
+    /// more than a look.
+    fn of_sure(block: &Block, ray: &Ray, lane: &TriangleLane) -> Option<Self::Answer>;
+
+    /// The answer when something is hit, if that is all there is to it.
+    fn of_hit() -> Option<Self::Answer> {
+        None
+    }
 
     /// The answer of a ray that can hit nothing.
     fn nothing() -> Self::Answer;
@@ -82,6 +97,17 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D
         Some(hit::<D>(block, ray, best.as_ref()?, watch))
     }
 
+    #[inline(always)]
+    fn sees_all(&self) -> bool {
+        self.filter.sees_all()
+    }
+
+    #[inline(always)]
+    fn of_sure(block: &Block, ray: &Ray, lane: &TriangleLane) -> Option<Option<Hit>> {
+        let (t, weights) = D::of_sure(ray, lane)?;
+        Some(Some(record(block, lane.place, t, weights)))
+    }
+
     fn nothing() -> Option<Hit> {
         None
     }
@@ -100,6 +126,19 @@ impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
     #[inline(always)]
     fn answer(_: &Block, _: &PreparedRay, _: &mut Self::Query, ended: bool) -> bool {
         ended
+    }
+
+    #[inline(always)]
+    fn sees_all(&self) -> bool {
+        self.filter.sees_all()
+    }
+
+    fn of_sure(_: &Block, _: &Ray, _: &TriangleLane) -> Option<bool> {
+        Some(true)
+    }
+
+    fn of_hit() -> Option<bool> {
+        Some(true)
     }
 
     fn nothing() -> bool {
@@ -137,6 +176,14 @@ impl<'m, D: Decide> Question for LocateHit<'m, D> {
     #[inline(always)]
     fn answer(_: &Block, _: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
         query.found
+    }
+
+    fn sees_all(&self) -> bool {
+        false
+    }
+
+    fn of_sure(_: &Block, _: &Ray, _: &TriangleLane) -> Option<Self::Answer> {
+        None
     }
 
     fn nothing() -> Self::Answer {
@@ -186,11 +233,14 @@ fn ask_odd<Q: Question>(block: &Block, ray: &Ray, question: Q) -> Q::Answer {
 /// The record of the meeting that won.
 #[inline(never)]
 fn hit<D: Decide>(block: &Block, ray: &PreparedRay, best: &D::Met, watch: &mut impl Watch) -> Hit {
-    let number = best.place().prim(block.prim_ids);
+    record(block, best.place(), D::t(ray, best, watch), D::weights(best))
+}
+
+#[inline(always)]
+fn record(block: &Block, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
+    let number = place.prim(block.prim_ids);
     let (geometry, first) =
         geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
-    let [u, v] = D::weights(best);
-    let t = D::t(ray, best, watch);
     Hit { t, u, v, prim: number - first, geometry, instance: NONE }
 }
 

@@ -6,7 +6,7 @@ mod packet;
 use crate::block::bundle::Bundle;
 use crate::block::{Block, Bundles};
 use crate::query::Query;
-use crate::ray::{PACKET, Ray};
+use crate::ray::{Alike, PACKET, Ray};
 use crate::simd::{self, Kernel, Simd};
 use crate::trace::{Question, ask};
 
@@ -69,8 +69,8 @@ impl<Q: Question + Copy, A> Kernel for Batch<'_, '_, Q, A> {
         while first < count {
             let (alike, end) = self.stretch(s, first, count);
             let part = self.part(first, end);
-            if alike {
-                part.trace_together(s);
+            if let Some(alike) = alike {
+                part.trace_together(s, alike);
             } else if near {
                 ask_each(part.block, part.rays, part.answers, part.question, part.keep);
             } else {
@@ -84,16 +84,17 @@ impl<Q: Question + Copy, A> Kernel for Batch<'_, '_, Q, A> {
 impl<'m, Q: Question + Copy, A> Batch<'_, 'm, Q, A> {
     /// Where the packet that begins with the ray `first` ends, or else where the next one begins.
     #[inline(always)]
-    fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (bool, usize) {
+    fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (Option<Alike>, usize) {
         let mut end = first;
         while end < count {
             let next = count.min(end + PACKET);
-            if packet::are_alike(s, &self.rays[end..next], self.block.header.reach) {
-                return if end == first { (true, next) } else { (false, end) };
+            let alike = Alike::of(s, &self.rays[end..next], self.block.header.reach);
+            if alike.is_some() {
+                return if end == first { (alike, next) } else { (None, end) };
             }
             end = next;
         }
-        (false, end)
+        (None, end)
     }
 
     /// The rays from `first` to `end`.

@@ -7,7 +7,7 @@ use crate::block::leaf::Place;
 use crate::exact::{Distance, Meeting};
 use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
-use crate::ray::{Interval, PreparedRay};
+use crate::ray::{Interval, PreparedRay, Ray};
 
 /// Hit or miss, the primitive and the order of real arithmetic; `t` correctly rounded.
 #[derive(Clone, Copy)]
@@ -58,8 +58,7 @@ impl ExactMet {
     /// rounding of these two sums; a hundredth of it covers its own arithmetic.
     #[inline(always)]
     fn interval(&self) -> Interval<f64> {
-        let margin = 1.01 * self.t_error;
-        Interval { near: self.t - margin, far: self.t + margin }
+        interval(self.t, self.t_error)
     }
 
     /// The meeting, if its real `t` is within the ray's limits.
@@ -249,16 +248,18 @@ impl Decide for Exact {
 
     #[inline(always)]
     fn t(ray: &PreparedRay, met: &ExactMet, watch: &mut impl Watch) -> f32 {
-        let nearest = met.t as f32;
-        let Interval { near, far } = met.interval();
-        let rounded = if near as f32 == nearest && far as f32 == nearest {
-            nearest
-        } else {
+        surely_rounded(met.interval(), met.t).unwrap_or_else(|| {
             watch.rounding();
-            met.rounded(ray)
-        };
-        // Adding +0 turns -0 into +0.
-        rounded + 0.0
+            // Adding +0 turns -0 into +0.
+            met.rounded(ray) + 0.0
+        })
+    }
+
+    #[inline(always)]
+    fn of_sure(ray: &Ray, lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
+        let meeting = triangle::clear_plane(&ray.line(), lane.corners())?;
+        let t = surely_rounded(interval(meeting.t, meeting.t_error), meeting.t)?;
+        Some((t, clamped_weights(meeting.weights.map(|weight| weight as f32))))
     }
 
     #[inline(always)]
@@ -274,6 +275,21 @@ fn unclear(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
         true => triangle::plane(&ray.line(), lane.corners()),
         false => triangle::meet(&ray.line(), lane.corners()),
     }
+}
+
+/// See [`ExactMet::interval`].
+#[inline(always)]
+fn interval(t: f64, t_error: f64) -> Interval<f64> {
+    let margin = 1.01 * t_error;
+    Interval { near: t - margin, far: t + margin }
+}
+
+/// The float that all numbers of an interval around `t` are rounded to, if there is one.
+#[inline(always)]
+fn surely_rounded(Interval { near, far }: Interval<f64>, t: f64) -> Option<f32> {
+    let nearest = t as f32;
+    // Adding +0 turns -0 into +0.
+    (near as f32 == nearest && far as f32 == nearest).then_some(nearest + 0.0)
 }
 
 /// Whether all of an interval lies within the limits, or only a part of it, or none.

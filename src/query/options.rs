@@ -114,6 +114,12 @@ impl<'m> Filter<'m> {
         }
     }
 
+    /// Whether nothing is left out.
+    #[inline(always)]
+    pub fn sees_all(&self) -> bool {
+        self.mask == 0 && self.skip == NONE && self.both_sides()
+    }
+
     /// Whether meetings with either side count.
     #[inline(always)]
     pub fn both_sides(&self) -> bool {
