@@ -2,15 +2,13 @@
 
 use core::marker::PhantomData;
 
+use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place};
 use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
-use crate::block::leaf::Place;
-use crate::query::{
-    Any, Closest, Decide, Filter, Locate, Meets, Query, TriangleLane, Watch, geometry_of,
-};
-use crate::ray::{Hit, NONE, PreparedRay, Ray, Slab, WideSlab};
+use crate::query::{Any, Closest, Decide, Exact, Filter, Locate, Meets, Query, Watch, geometry_of};
+use crate::ray::{Hit, Interval, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
 /// What is asked of a ray.
@@ -29,18 +27,6 @@ pub(crate) trait Question {
         query: &mut Self::Query,
         ended: bool,
     ) -> Self::Answer;
-
-    /// Whether it leaves no primitive out.
-    fn sees_all(&self) -> bool;
-
-    /// The answer for a ray that surely meets the triangle within its limits, and whatever else it asks for after it; `None` when that takes
-    /// more than a look.
-    fn of_sure(block: &Block, ray: &Ray, lane: &TriangleLane) -> Option<Self::Answer>;
-
-    /// The answer when something is hit, if that is all there is to it.
-    fn of_hit() -> Option<Self::Answer> {
-        None
-    }
 
     /// The answer of a ray that can hit nothing.
     fn nothing() -> Self::Answer;
@@ -97,17 +83,6 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question for ClosestHit<'m, D
         Some(hit::<D>(block, ray, best.as_ref()?, watch))
     }
 
-    #[inline(always)]
-    fn sees_all(&self) -> bool {
-        self.filter.sees_all()
-    }
-
-    #[inline(always)]
-    fn of_sure(block: &Block, ray: &Ray, lane: &TriangleLane) -> Option<Option<Hit>> {
-        let (t, weights) = D::of_sure(ray, lane)?;
-        Some(Some(record(block, lane.place, t, weights)))
-    }
-
     fn nothing() -> Option<Hit> {
         None
     }
@@ -128,21 +103,59 @@ impl<'m, D: Decide, W: Watch> Question for AnyHit<'m, D, W> {
         ended
     }
 
+    fn nothing() -> bool {
+        false
+    }
+}
+
+/// A question that rays can ask together, by what is sure of each without a query.
+pub(crate) trait Together: Question + Copy {
+    /// Whether it leaves no primitive out.
+    fn sees_all(&self) -> bool;
+
+    /// The answer for a ray that meets the primitive in the one lane of `leaf` before all others, within its limits; `None`
+    /// when that takes more than a look.
+    fn of_sure(block: &Block, ray: &Ray, leaf: LeafRef) -> Option<Self::Answer>;
+
+    /// What a query was offered before all else, and the `t` between which it is met.
+    fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)>;
+}
+
+impl<const MEMORY: usize> Together for ClosestHit<'_, Exact, (), MEMORY> {
     #[inline(always)]
     fn sees_all(&self) -> bool {
         self.filter.sees_all()
     }
 
-    fn of_sure(_: &Block, _: &Ray, _: &TriangleLane) -> Option<bool> {
+    #[inline(always)]
+    fn of_sure(block: &Block, ray: &Ray, leaf: LeafRef) -> Option<Option<Hit>> {
+        let (number, lane) = (leaf.number(), leaf.lanes.trailing_zeros());
+        let triangles =
+            block.triangle_blocks.get(number).filter(|_| leaf.kind() == KIND_TRIANGLES)?;
+        let (t, weights) = Exact::of_sure(ray, triangles.triangle(lane as usize))?;
+        let entry = triangles.first.wrapping_add(lane);
+        let place = Place { block: number as u32, lane, entry };
+        Some(Some(record(block, place, t, weights)))
+    }
+
+    fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
+        query.best.as_ref().map(|met| (met.leaf(), met.interval()))
+    }
+}
+
+impl Together for AnyHit<'_, Exact, ()> {
+    #[inline(always)]
+    fn sees_all(&self) -> bool {
+        self.filter.sees_all()
+    }
+
+    #[inline(always)]
+    fn of_sure(_: &Block, _: &Ray, _: LeafRef) -> Option<bool> {
         Some(true)
     }
 
-    fn of_hit() -> Option<bool> {
-        Some(true)
-    }
-
-    fn nothing() -> bool {
-        false
+    fn best(_: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
+        None
     }
 }
 
@@ -176,14 +189,6 @@ impl<'m, D: Decide> Question for LocateHit<'m, D> {
     #[inline(always)]
     fn answer(_: &Block, _: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
         query.found
-    }
-
-    fn sees_all(&self) -> bool {
-        false
-    }
-
-    fn of_sure(_: &Block, _: &Ray, _: &TriangleLane) -> Option<Self::Answer> {
-        None
     }
 
     fn nothing() -> Self::Answer {

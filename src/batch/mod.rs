@@ -6,16 +6,16 @@ mod packet;
 use crate::block::bundle::Bundle;
 use crate::block::{Block, Bundles};
 use crate::query::Query;
-use crate::ray::{Alike, PACKET, Ray};
+use crate::ray::{Alike, Ray};
 use crate::simd::{self, Kernel, Simd};
-use crate::trace::{Question, ask};
+use crate::trace::{Question, Together, ask};
 
 /// Blocks of fewer bytes mostly are in the cache, and single calls then wait for nothing that others could use: with
 /// closest hits, and with any hits, which are over sooner.
 const NEAR: [usize; 2] = [2 << 20, 16 << 20];
 
 /// Answers `question` for each ray, by `keep` into its answer; stops at the end of the shorter slice.
-pub(crate) fn ask_all<Q: Question + Copy, A>(
+pub(crate) fn ask_all<Q: Together, A>(
     block: &Block,
     rays: &[Ray],
     answers: &mut [A],
@@ -54,7 +54,7 @@ struct Batch<'a, 'm, Q: Question, A> {
     keep: fn(Q::Answer) -> A,
 }
 
-impl<Q: Question + Copy, A> Kernel for Batch<'_, '_, Q, A> {
+impl<Q: Together, A> Kernel for Batch<'_, '_, Q, A> {
     type Output = ();
 
     #[inline(always)]
@@ -87,12 +87,11 @@ impl<'m, Q: Question + Copy, A> Batch<'_, 'm, Q, A> {
     fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (Option<Alike>, usize) {
         let mut end = first;
         while end < count {
-            let next = count.min(end + PACKET);
-            let alike = Alike::of(s, &self.rays[end..next], self.block.header.reach);
-            if alike.is_some() {
-                return if end == first { (alike, next) } else { (None, end) };
+            let rays = &self.rays[end..count];
+            if let Some((alike, length)) = Alike::first_of(s, rays, self.block.header.reach) {
+                return if end == first { (Some(alike), end + length) } else { (None, end) };
             }
-            end = next;
+            end = count.min(end + 16);
         }
         (None, end)
     }

@@ -3,7 +3,7 @@
 use core::cmp::Ordering;
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
-use crate::block::leaf::Place;
+use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, block_ref};
 use crate::exact::{Distance, Meeting};
 use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
@@ -57,8 +57,17 @@ impl ExactMet {
     /// `t_error` grants at least one rounding of `t` more than the error needs, which covers the
     /// rounding of these two sums; a hundredth of it covers its own arithmetic.
     #[inline(always)]
-    fn interval(&self) -> Interval<f64> {
+    pub fn interval(&self) -> Interval<f64> {
         interval(self.t, self.t_error)
+    }
+
+    /// Where what is met is stored, as a leaf of one lane.
+    pub fn leaf(&self) -> LeafRef {
+        let kind = match self.meeting {
+            Meeting::Triangle(_) => KIND_TRIANGLES,
+            Meeting::Sphere { .. } => KIND_SPHERES,
+        };
+        LeafRef { block: block_ref(kind, self.place.block), lanes: 1 << self.place.lane }
     }
 
     /// The meeting, if its real `t` is within the ray's limits.
@@ -142,6 +151,17 @@ impl ExactMemory {
             *self = ExactMemory { of: Some(key), t: Distance::new(&ray.line(), &met.meeting) };
         }
         self.t.as_ref()
+    }
+}
+
+impl Exact {
+    /// The answered `t` and weights of a triangle that the ray surely meets within its limits; `None` when that takes more
+    /// than a look.
+    #[inline(always)]
+    pub fn of_sure(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<(f32, [f32; 2])> {
+        let meeting = triangle::clear_plane(&ray.line(), corners)?;
+        let t = surely_rounded(interval(meeting.t, meeting.t_error), meeting.t)?;
+        Some((t, clamped_weights(meeting.weights.map(|weight| weight as f32))))
     }
 }
 
@@ -253,13 +273,6 @@ impl Decide for Exact {
             // Adding +0 turns -0 into +0.
             met.rounded(ray) + 0.0
         })
-    }
-
-    #[inline(always)]
-    fn of_sure(ray: &Ray, lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
-        let meeting = triangle::clear_plane(&ray.line(), lane.corners())?;
-        let t = surely_rounded(interval(meeting.t, meeting.t_error), meeting.t)?;
-        Some((t, clamped_weights(meeting.weights.map(|weight| weight as f32))))
     }
 
     #[inline(always)]

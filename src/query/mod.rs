@@ -16,7 +16,7 @@ pub(crate) use options::{Filter, flat_number, geometry_of};
 pub(crate) use watertight::Watertight;
 
 use crate::block::leaf::{Place, TriangleBlock};
-use crate::ray::{PreparedRay, Ray};
+use crate::ray::PreparedRay;
 use crate::sieve::SphereDetail;
 
 /// What a query did, for charts and heat maps.
@@ -177,13 +177,6 @@ pub(crate) trait Decide {
 
     /// The given `t` of the answer.
     fn t(ray: &PreparedRay, met: &Self::Met, watch: &mut impl Watch) -> f32;
-
-    /// The answered `t` and weights of a triangle that the ray surely meets within its limits; `None` when that takes more
-    /// than a look.
-    #[inline(always)]
-    fn of_sure(_ray: &Ray, _lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
-        None
-    }
 
     /// The weights of the second and the third vertex.
     fn weights(met: &Self::Met) -> [f32; 2];

@@ -147,10 +147,11 @@ impl Abreast {
         near.less_or_equal(far)
     }
 
-    /// Nothing is of interest to the ray in this lane any more.
+    /// Nothing is of interest to these rays any more.
     #[inline(always)]
-    pub fn end(&mut self, lane: usize) {
-        self.high[lane % 16] = f32::NEG_INFINITY;
+    pub fn end<S: Width<16>>(&mut self, s: S, rays: u32) {
+        let high = s.load(&self.high);
+        s.select(rays, s.splat(f32::NEG_INFINITY), high).store(&mut self.high);
     }
 }
 

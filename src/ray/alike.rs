@@ -2,6 +2,7 @@
 
 use super::Ray;
 use super::frame::{is_ordinary, scale_below};
+use super::packet::GROUPS;
 use crate::simd::{Lanes, Width};
 
 /// Fewer rays are not worth it.
@@ -29,11 +30,25 @@ pub(crate) struct Alike {
 }
 
 impl Alike {
-    /// What these rays have in common, or `None` if they had better be traced one by one. `reach` is the largest
-    /// coordinate of the scene.
+    /// What the first of these rays have in common, and how many these are: 16, 32, 48 or 64, or all; `None` if not even 16 had better
+    /// go together. `reach` is the largest coordinate of the scene.
     #[inline(always)]
-    pub fn of<S: Width<4>>(s: S, rays: &[Ray], reach: f32) -> Option<Self> {
-        let [o_least, o_most, d_least, d_most] = extremes(s, rays)?;
+    pub fn first_of<S: Width<4>>(s: S, rays: &[Ray], reach: f32) -> Option<(Self, usize)> {
+        let mut known = None;
+        let mut extremes: Option<Extremes<S::V>> = None;
+        let mut count = 0;
+        for part in rays.chunks(16).take(GROUPS) {
+            let Some(more) = Extremes::of(s, part, extremes) else { break };
+            let Some(alike) = Alike::within(more.stored(), reach) else { break };
+            count += part.len();
+            (known, extremes) = (Some((alike, count)), Some(more));
+        }
+        known.filter(|(_, count)| *count >= LEAST)
+    }
+
+    /// What rays have in common whose numbers lie within these.
+    #[inline(always)]
+    fn within([o_least, o_most, d_least, d_most]: [[f32; 4]; 4], reach: f32) -> Option<Self> {
         let (mut apart, mut asunder, mut longest, mut depth) = (0f32, 0f32, 0f32, 0);
         let (mut farthest, mut one_way) = (reach, true);
         for k in 0..3 {
@@ -45,8 +60,8 @@ impl Alike {
             one_way &= d_least[k] > 0.0 || d_most[k] < 0.0;
         }
         let near = asunder <= ASUNDER * longest && apart <= APART * reach;
-        let alike = rays.len() >= LEAST && one_way && near;
-        if !(alike && is_ordinary(0.5 * longest) && is_ordinary(longest) && is_ordinary(farthest)) {
+        let ordinary = is_ordinary(0.5 * longest) && is_ordinary(longest) && is_ordinary(farthest);
+        if !(one_way && near && ordinary) {
             return None;
         }
         let scale = scale_below(farthest);
@@ -65,22 +80,34 @@ impl Alike {
     }
 }
 
-/// The least and the largest components of origins, and those of directions.
-#[inline(always)]
-fn extremes<S: Width<4>>(s: S, rays: &[Ray]) -> Option<[[f32; 4]; 4]> {
-    let [o, d] = rays.first()?.rows();
-    let (o, d) = (s.load(&o), s.load(&d));
-    let (mut o_least, mut o_most, mut d_least, mut d_most) = (o, o, d, d);
-    for ray in rays {
-        let [o, d] = ray.rows();
+/// The least and the largest components of origins, and those of directions; a NaN is left out.
+#[derive(Clone, Copy)]
+struct Extremes<V>([V; 4]);
+
+impl<V: Lanes<4>> Extremes<V> {
+    /// Of these rays, and of those `before`.
+    #[inline(always)]
+    fn of<S: Width<4, V = V>>(s: S, rays: &[Ray], before: Option<Self>) -> Option<Self> {
+        let [o, d] = rays.first()?.rows();
         let (o, d) = (s.load(&o), s.load(&d));
-        (o_least, o_most) = (o.min(o_least), o.max(o_most));
-        (d_least, d_most) = (d.min(d_least), d.max(d_most));
+        let Extremes([mut o_least, mut o_most, mut d_least, mut d_most]) =
+            before.unwrap_or(Extremes([o, o, d, d]));
+        for ray in rays {
+            let [o, d] = ray.rows();
+            let (o, d) = (s.load(&o), s.load(&d));
+            (o_least, o_most) = (o.min(o_least), o.max(o_most));
+            (d_least, d_most) = (d.min(d_least), d.max(d_most));
+        }
+        Some(Extremes([o_least, o_most, d_least, d_most]))
     }
-    let mut extremes = [[0.0; 4]; 4];
-    o_least.store(&mut extremes[0]);
-    o_most.store(&mut extremes[1]);
-    d_least.store(&mut extremes[2]);
-    d_most.store(&mut extremes[3]);
-    Some(extremes)
+
+    #[inline(always)]
+    fn stored(&self) -> [[f32; 4]; 4] {
+        let mut extremes = [[0.0; 4]; 4];
+        self.0[0].store(&mut extremes[0]);
+        self.0[1].store(&mut extremes[1]);
+        self.0[2].store(&mut extremes[2]);
+        self.0[3].store(&mut extremes[3]);
+        extremes
+    }
 }

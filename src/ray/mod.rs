@@ -11,7 +11,7 @@ mod slab;
 pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use frame::{PreparedRay, TINY};
-pub(crate) use packet::{GROUPS, PACKET, RayPacket};
+pub(crate) use packet::{GROUPS, RayPacket};
 pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".

@@ -128,10 +128,7 @@ impl<V: Copy> Meetings<V> {
 
     /// How far the meetings are before each of these depths, times `total`.
     #[inline(always)]
-    fn before<const FUSED: bool, const N: usize>(
-        &self,
-        [low, high]: [V; 2],
-    ) -> [V; 2]
+    fn before<const FUSED: bool, const N: usize>(&self, [low, high]: [V; 2]) -> [V; 2]
     where
         V: Lanes<N>,
     {

@@ -223,7 +223,8 @@ pub(super) mod single {
     pub fn sieve(ray: &PreparedRay, t_bound: f32, corners: [[f32; 3]; 3]) -> Sieved {
         let middle = Middle::of_one(ray, &Aabb::around(&corners));
         let One { areas, meetings } = One::new(ray, &middle, corners);
-        let outside = meetings.outside::<_, false, 1>(Scalar, middle.window(Scalar, limits(ray, t_bound)));
+        let outside =
+            meetings.outside::<_, false, 1>(Scalar, middle.window(Scalar, limits(ray, t_bound)));
         let inner = middle.inner_window(Scalar, ray.inner_depths().map(|depth| [depth]));
         let inside = meetings.inside::<_, false, 1>(Scalar, inner);
         let sure = areas.sure(Scalar) != 0;

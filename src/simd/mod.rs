@@ -91,7 +91,9 @@ pub(crate) trait Width<const N: usize>: Copy {
     fn largest(self, v: Self::V) -> f32 {
         let mut lanes = [0.0; N];
         v.store(&mut lanes);
-        lanes.into_iter().fold(f32::NEG_INFINITY, |largest, x| if x > largest { x } else { largest })
+        lanes
+            .into_iter()
+            .fold(f32::NEG_INFINITY, |largest, x| if x > largest { x } else { largest })
     }
 
     /// Writes `word` into the lanes of `mask`.
