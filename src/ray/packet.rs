@@ -7,12 +7,10 @@ use super::slab::WideBoxes;
 use crate::math::Aabb;
 use crate::simd::{Lanes, Width};
 
-/// Rays of a packet at most.
-pub(crate) const PACKET: usize = 16 * GROUPS;
-/// They are looked at in groups of 16.
+/// Rays of a packet are looked at in so many groups of 16 at most.
 pub(crate) const GROUPS: usize = 4;
 
-/// Up to [`PACKET`] rays that [are alike](Alike).
+/// Up to 16 rays for each of the [groups](GROUPS), which [are alike](Alike).
 pub(crate) struct RayPacket {
     pub alike: Alike,
     groups: [Abreast; GROUPS],

@@ -1,6 +1,8 @@
 //! The first look at the primitives of a leaf block, in `f32`: it only rejects.
 
 mod abreast;
+#[cfg(test)]
+mod abreast_bounds;
 mod areas;
 #[cfg(test)]
 mod bounds;
