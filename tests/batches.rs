@@ -6,8 +6,8 @@ mod common;
 
 use common::{All, bits};
 use raykern::{
-    Accel, BuildOptions, Facing, Hit, Mesh, NONE, OwnedAccel, Precision, PrimId, QueryOptions, Ray,
-    Scene,
+    Accel, Backend, BuildOptions, Facing, Hit, Mesh, NONE, OwnedAccel, Precision, PrimId,
+    QueryOptions, Ray, Scene,
 };
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
@@ -204,6 +204,11 @@ fn rays_that_single_floats_cannot_decide() {
             if i % 50 == 3 { ray.with_limits(1.0, 0.5) } else { ray }
         })
         .collect();
-    let hits = same_in_all(&model, &rays);
-    assert!(hits > 1_000, "{hits}");
+    // Whatever other tests of this process use meanwhile gives the same bits.
+    for backend in Backend::ALL {
+        backend.force();
+        let hits = same_in_all(&model, &rays);
+        assert!(hits > 1_000, "{hits}");
+    }
+    Backend::detected().force();
 }
