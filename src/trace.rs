@@ -2,14 +2,15 @@
 
 use core::marker::PhantomData;
 
+use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place};
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
 use crate::query::{
-    Any, Choice, Closest, Decide, Filter, Locate, Meets, Query, Watch, geometry_of,
+    Any, Choice, Closest, Decide, Exact, Filter, Locate, Meets, Query, Watch, geometry_of,
 };
-use crate::ray::{Hit, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
+use crate::ray::{Hit, Interval, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
 /// What is asked of a ray.
@@ -112,6 +113,57 @@ impl<'m, D: Decide, W: Watch> Question<'m> for AnyHit<D, W> {
     }
 }
 
+/// A question that rays can ask together, by what is sure of each without a query.
+pub(crate) trait Together<'m>: Question<'m> + Copy {
+    /// Whether it leaves no primitive out.
+    fn sees_all(&self) -> bool;
+
+    /// The answer for a ray that meets the primitive in the one lane of `leaf` before all others, within its limits; `None`
+    /// when that takes more than a look.
+    fn of_sure(block: &Block, ray: &Ray, leaf: LeafRef) -> Option<Self::Answer>;
+
+    /// What a query was offered before all else, and the `t` between which it is met.
+    fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)>;
+}
+
+impl<'m, const MEMORY: usize> Together<'m> for ClosestHit<Exact, (), MEMORY> {
+    #[inline(always)]
+    fn sees_all(&self) -> bool {
+        self.choice.sees_all()
+    }
+
+    #[inline(always)]
+    fn of_sure(block: &Block, ray: &Ray, leaf: LeafRef) -> Option<Option<Hit>> {
+        let (number, lane) = (leaf.number(), leaf.lanes.trailing_zeros());
+        let triangles =
+            block.triangle_blocks.get(number).filter(|_| leaf.kind() == KIND_TRIANGLES)?;
+        let (t, weights) = Exact::of_sure(ray, triangles.triangle(lane as usize))?;
+        let entry = triangles.first.wrapping_add(lane);
+        let place = Place { block: number as u32, lane, entry };
+        Some(Some(record(block, place, t, weights)))
+    }
+
+    fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
+        query.best.as_ref().map(|met| (met.leaf(), met.interval()))
+    }
+}
+
+impl<'m> Together<'m> for AnyHit<Exact, ()> {
+    #[inline(always)]
+    fn sees_all(&self) -> bool {
+        self.choice.sees_all()
+    }
+
+    #[inline(always)]
+    fn of_sure(_: &Block, _: &Ray, _: LeafRef) -> Option<bool> {
+        Some(true)
+    }
+
+    fn best(_: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
+        None
+    }
+}
+
 /// The meeting with the primitive of a number at an answered `t`.
 #[derive(Clone, Copy)]
 pub(crate) struct LocateHit<D> {
@@ -200,12 +252,14 @@ fn hit<D: Decide>(
     best: &D::Met,
     watch: &mut impl Watch,
 ) -> Hit {
-    let Block { prim_ids, geometries, .. } = block.parts();
-    let number = best.place().prim(prim_ids);
+    record(&block.parts(), best.place(), D::t(ray, best, watch), D::weights(best))
+}
+
+#[inline(always)]
+fn record(block: &Block, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
+    let number = place.prim(block.prim_ids);
     let (geometry, first) =
-        geometry_of(number, geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
-    let [u, v] = D::weights(best);
-    let t = D::t(ray, best, watch);
+        geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
     Hit { t, u, v, prim: number - first, geometry, instance: NONE }
 }
 

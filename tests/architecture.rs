@@ -32,7 +32,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ),
     ("surface", &["exact", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
-    ("batch", &["block", "bvh", "prim", "query", "ray", "simd", "trace"]),
+    ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
     (
         "accel",
         &["batch", "block", "bvh", "error", "grid", "prim", "query", "ray", "surface", "trace"],

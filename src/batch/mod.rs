@@ -6,16 +6,16 @@ mod packet;
 use crate::block::bundle::Bundle;
 use crate::block::{Block, Bundles, Finished};
 use crate::query::Query;
-use crate::ray::{PACKET, Ray};
+use crate::ray::{Alike, Ray};
 use crate::simd::{self, Kernel, Simd};
-use crate::trace::{Question, ask};
+use crate::trace::{Question, Together, ask};
 
 /// Blocks of fewer bytes mostly are in the cache, and single calls then wait for nothing that others could use: with
 /// closest hits, and with any hits, which are over sooner.
 const NEAR: [usize; 2] = [2 << 20, 16 << 20];
 
 /// Answers `question` for each ray, by `keep` into its answer; stops at the end of the shorter slice.
-pub(crate) fn ask_all<'m, Q: Question<'m> + Copy, A>(
+pub(crate) fn ask_all<'m, Q: Together<'m>, A>(
     block: Finished<'m>,
     rays: &[Ray],
     answers: &mut [A],
@@ -55,7 +55,7 @@ struct Batch<'a, 'm, Q: Question<'m>, A> {
     keep: fn(Q::Answer) -> A,
 }
 
-impl<'m, Q: Question<'m> + Copy, A> Kernel for Batch<'_, 'm, Q, A> {
+impl<'m, Q: Together<'m>, A> Kernel for Batch<'_, 'm, Q, A> {
     type Output = ();
 
     #[inline(always)]
@@ -70,8 +70,8 @@ impl<'m, Q: Question<'m> + Copy, A> Kernel for Batch<'_, 'm, Q, A> {
         while first < count {
             let (alike, end) = self.stretch(s, first, count);
             let part = self.part(first, end);
-            if alike {
-                part.trace_together(s);
+            if let Some(alike) = alike {
+                part.trace_together(s, alike);
             } else if near {
                 ask_each(part.block.whole, part.rays, part.answers, part.question, part.keep);
             } else {
@@ -85,16 +85,16 @@ impl<'m, Q: Question<'m> + Copy, A> Kernel for Batch<'_, 'm, Q, A> {
 impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
     /// Where the packet that begins with the ray `first` ends, or else where the next one begins.
     #[inline(always)]
-    fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (bool, usize) {
+    fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (Option<Alike>, usize) {
         let mut end = first;
         while end < count {
-            let next = count.min(end + PACKET);
-            if packet::are_alike(s, &self.rays[end..next], self.block.header.reach) {
-                return if end == first { (true, next) } else { (false, end) };
+            let rays = &self.rays[end..count];
+            if let Some((alike, length)) = Alike::first_of(s, rays, self.block.header.reach) {
+                return if end == first { (Some(alike), end + length) } else { (None, end) };
             }
-            end = next;
+            end = count.min(end + 16);
         }
-        (false, end)
+        (None, end)
     }
 
     /// The rays from `first` to `end`.

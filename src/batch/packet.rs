@@ -1,130 +1,265 @@
-//! Rays that are alike, as one thick ray through the bundles and each by itself through the leaves.
+//! Rays that are alike: as one thick ray through the bundles, and side by side through the leaves.
 
 use super::Batch;
-use crate::block::bundle::ChildRef;
+use crate::block::bundle::{Bundle, ChildRef};
+use crate::block::leaf::{KIND_TRIANGLES, LeafRef, block_ref};
 use crate::bvh::{Columns, ENOUGH_ROOM, Walk};
+use crate::math::rounding::{f32_above, f32_below};
 use crate::prim::Leaves;
 use crate::query::Query;
-use crate::ray::{GROUPS, PACKET, PreparedRay, Ray, SlabPacket};
-use crate::simd::{Lanes, Simd, Width};
-use crate::trace::Question;
+use crate::ray::{Alike, GROUPS, RayPacket, Sixteen, WideBoxes};
+use crate::sieve::{Aim, Found, Opened, Sheared};
+use crate::simd::{Lanes, Scalar, Simd, Width};
+use crate::trace::Together;
 
-/// Fewer rays are not worth it.
-const LEAST: usize = 8;
-/// How far directions may be apart along an axis, of their largest component, and origins, of the scene's largest
-/// coordinate.
-const ASUNDER: f32 = 0.25;
-const APART: f32 = 0.125;
-
-/// Whether rays had better be traced together: they begin and run nearly the same, and the same way along each axis.
-#[inline(always)]
-pub(super) fn are_alike<S: Simd>(s: S, rays: &[Ray], reach: f32) -> bool {
-    let Some(first) = rays.first() else { return false };
-    let [o, d] = first.rows();
-    let (o, d) = (Width::<4>::load(s, &o), Width::<4>::load(s, &d));
-    let (mut o_least, mut o_most, mut d_least, mut d_most) = (o, o, d, d);
-    for ray in rays {
-        let [o, d] = ray.rows();
-        let (o, d) = (Width::<4>::load(s, &o), Width::<4>::load(s, &d));
-        (o_least, o_most) = (o.min(o_least), o.max(o_most));
-        (d_least, d_most) = (d.min(d_least), d.max(d_most));
-    }
-    let mut extremes = [[0.0; 4]; 4];
-    o_least.store(&mut extremes[0]);
-    o_most.store(&mut extremes[1]);
-    d_least.store(&mut extremes[2]);
-    d_most.store(&mut extremes[3]);
-    let [o_least, o_most, d_least, d_most] = extremes;
-    let (mut apart, mut asunder, mut longest, mut one_way) = (0f32, 0f32, 0f32, true);
-    for k in 0..3 {
-        apart = apart.max(o_most[k] - o_least[k]);
-        asunder = asunder.max(d_most[k] - d_least[k]);
-        longest = longest.max(d_most[k].abs());
-        one_way &= d_least[k] > 0.0 || d_most[k] < 0.0;
-    }
-    rays.len() >= LEAST && one_way && asunder <= ASUNDER * longest && apart <= APART * reach
+/// Rays on their way together.
+///
+/// What `f32` is sure of needs no more for now: a triangle that surely is met, and surely before what was met so far, takes
+/// its place. Its `t` is computed at the end, and only for the one that is left. All else is decided for the ray alone.
+struct Company<'a, 'm, Q: Together<'m>, A> {
+    batch: Batch<'a, 'm, Q, A>,
+    leaves: Leaves<'m>,
+    packet: RayPacket,
+    /// One bit for each ray that met something, or that is answered.
+    met: [u32; GROUPS],
+    /// What it met, before all others so far: a leaf block and one lane of it.
+    blocks: [[u32; 16]; GROUPS],
+    lanes: [[u32; 16]; GROUPS],
+    /// Below its depth; the packet knows what is above.
+    near: [Sixteen; GROUPS],
+    /// All bits, unless some primitives are left out: then each is asked for alone.
+    trusted: u32,
 }
 
-/// A ray of a packet.
-struct Member<Q> {
-    ray: PreparedRay,
-    /// `None` when it is answered.
-    query: Option<Q>,
-}
-
-impl<Q> Member<Q> {
-    const NONE: Self = Member { ray: PreparedRay::BLANK, query: None };
-}
-
-impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
-    /// Traces rays that [are alike](are_alike), [`PACKET`] at most.
+impl<'m, Q: Together<'m>, A> Batch<'_, 'm, Q, A> {
+    /// Traces rays that are alike, 16 for each of the [groups](GROUPS) at most.
     #[inline(always)]
-    pub(super) fn trace_together<S: Simd>(mut self, s: S) {
-        let mut members = [const { Member::<Q::Query>::NONE }; PACKET];
-        let mut slabs = SlabPacket::EMPTY;
-        for (number, member) in members.iter_mut().enumerate().take(self.rays.len()) {
-            match self.rays[number].prepare_with(s, self.block.header.reach) {
-                Some((ray, slab)) => {
-                    let query = self.question.query(self.block, ray.t_max);
-                    slabs.set(number, &slab);
-                    slabs.set_bound(number, query.t_bound());
-                    *member = Member { ray, query: Some(query) };
-                }
-                None => self.answer_alone(number),
-            }
-        }
-        self.descend(s, &mut members, &mut slabs);
-        for (number, member) in members.iter_mut().enumerate() {
-            if let Some(query) = &mut member.query {
-                self.write(number, Q::answer(self.block, &member.ray, query, false));
-            }
-        }
+    pub(super) fn trace_together<S: Simd>(self, s: S, alike: Alike) {
+        let mut company = Company {
+            leaves: Leaves::of(self.block),
+            packet: RayPacket::new(alike),
+            met: [0; GROUPS],
+            blocks: [[0; 16]; GROUPS],
+            lanes: [[0; 16]; GROUPS],
+            near: [[f32::INFINITY; 16]; GROUPS],
+            trusted: if self.question.sees_all() { u32::MAX } else { 0 },
+            batch: self,
+        };
+        let sound = company.packet.set(s, company.batch.rays);
+        company.descend(s);
+        company.settle(sound);
     }
+}
 
+impl<'m, Q: Together<'m>, A> Company<'_, 'm, Q, A> {
     #[inline(always)]
-    fn descend<S: Simd>(
-        &mut self,
-        s: S,
-        members: &mut [Member<Q::Query>; PACKET],
-        slabs: &mut SlabPacket,
-    ) {
-        let leaves = Leaves::of(self.block);
-        let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
-        let mut walk = Walk::new(&mut columns, slabs.largest_bound(s));
+    fn descend<S: Simd>(&mut self, s: S) {
+        let (mut columns, mut room) = (Columns::<ENOUGH_ROOM>::UNWRITTEN, [[[0.0; 16]; 2]; 16]);
+        let mut walk = Walk::new(&mut columns, self.packet.highest(s));
         loop {
-            let (hull, bound) = (slabs.hull(s), Width::<16>::splat(s, walk.t_bound()));
+            let (hull, bound) = (self.packet.hull(s), Width::<16>::splat(s, walk.t_bound()));
             while !walk.at().is_leaf() {
-                let Some(bundle) = self.bundles.get(walk.at().bundle_number()) else { return };
-                if !walk.enter::<S, Q::Query, 16>(s, bundle, &hull, bound) {
+                let Some(bundle) = self.batch.bundles.get(walk.at().bundle_number()) else {
+                    return;
+                };
+                let (entered, near) = hull.entered::<true>(&bundle.walls, bound);
+                self.fetch(s, bundle, entered);
+                if !walk.go_on::<S, Q::Query, 16>(s, bundle, entered, near) {
                     return;
                 }
             }
             if walk.at() == ChildRef::NONE {
                 return;
             }
-            let leaf = walk.at().leaf_block();
-            let aabb = leaves.aabb(leaf);
-            for group in 0..GROUPS {
-                let mut entered = slabs.entered(s, group, &aabb);
-                while entered != 0 {
-                    let number = 16 * group + entered.trailing_zeros() as usize % 16;
-                    entered &= entered - 1;
-                    let Member { ray, query: Some(query) } = &mut members[number] else { continue };
-                    if leaves.intersect_whole(s, leaf, ray, query) {
-                        let answer = Q::answer(self.block, ray, query, true);
-                        members[number].query = None;
-                        slabs.set_bound(number, f32::NEG_INFINITY);
-                        self.write(number, answer);
-                    } else {
-                        slabs.set_bound(number, query.t_bound());
-                    }
-                }
-            }
-            let bound = slabs.largest_bound(s);
+            self.visit(s, walk.at().leaf_block(), &mut room);
+            let bound = self.packet.highest(s);
             if bound == f32::NEG_INFINITY {
                 return;
             }
             walk.leave::<S, Q::Query>(s, bound);
         }
+    }
+
+    /// Has children fetched, nearly all of which will be visited.
+    #[inline(always)]
+    fn fetch<S: Simd>(&self, s: S, bundle: &Bundle<16>, children: u32) {
+        let mut rest = children;
+        while rest != 0 {
+            let child = bundle.refs[rest.trailing_zeros() as usize % 16];
+            rest &= rest - 1;
+            if child.is_leaf() {
+                self.leaves.prefetch(s, child.leaf_block());
+            } else if let Some(bundle) = self.batch.bundles.get(child.bundle_number()) {
+                s.prefetch(bundle);
+            }
+        }
+    }
+
+    /// Offers a leaf to the rays that enter its box.
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, s: S, leaf: (u32, usize), room: &mut Sheared) {
+        let (kind, number) = leaf;
+        let entered = self.packet.entered(s, &self.leaves.aabb(leaf));
+        if entered == [0; GROUPS] {
+            return;
+        }
+        let block = block_ref(kind, number as u32);
+        if kind != KIND_TRIANGLES {
+            for (group, entered) in entered.into_iter().enumerate() {
+                self.ask_alone(group, entered, LeafRef { block, lanes: 0xFFFF });
+            }
+            return;
+        }
+        let Some(triangles) = self.leaves.triangle_blocks.get(number) else { return };
+        let opened = Opened::new(s, &self.packet.alike, triangles);
+        for (group, entered) in entered.into_iter().enumerate() {
+            if entered != 0 {
+                self.look(s, group, entered, block, &opened, room);
+            }
+        }
+    }
+
+    /// Offers the triangles of a block to rays of a group.
+    #[inline(always)]
+    fn look<S: Simd>(
+        &mut self,
+        s: S,
+        group: usize,
+        entered: u32,
+        block: u32,
+        opened: &Opened,
+        room: &mut Sheared,
+    ) {
+        let mut aim = Aim::new(s, self.packet.group(group), opened, room);
+        let active = entered & aim.within(s);
+        let mut rest = aim.passed(s, opened, active);
+        while rest != 0 {
+            let lane = rest.trailing_zeros();
+            rest &= rest - 1;
+            // Those of any hits are met once.
+            let active = if Q::Query::ORDERED { active } else { active & !self.met[group] };
+            let mut found = aim.look(s, opened, lane as usize, active);
+            found.clear &= self.trusted;
+            let (taken, doubt) = if Q::Query::ORDERED {
+                self.order(s, group, &found, aim.span(s, &found))
+            } else {
+                (found.clear, found.candidates & !found.clear)
+            };
+            self.met[group] |= taken;
+            s.set_words(taken, block, &mut self.blocks[group]);
+            s.set_words(taken, 1 << lane, &mut self.lanes[group]);
+            self.fetch_id(s, opened.block.first.wrapping_add(lane));
+            if doubt != 0 {
+                self.ask_alone(group, doubt, LeafRef { block, lanes: 1 << lane });
+            }
+            if Q::Query::ORDERED {
+                aim.limit(s, Width::<16>::load(s, &self.packet.group(group).high));
+            }
+        }
+        if !Q::Query::ORDERED {
+            self.packet.group(group).end(s, self.met[group]);
+        }
+    }
+
+    /// The rays that meet a triangle surely before what they met so far, which that replaces, and those of which this is
+    /// in doubt.
+    #[inline(always)]
+    fn order<S: Width<16>>(
+        &mut self,
+        s: S,
+        group: usize,
+        found: &Found<S::V>,
+        [near, far]: [S::V; 2],
+    ) -> (u32, u32) {
+        let high = &mut self.packet.group(group).high;
+        let (best_near, best_far) = (s.load(&self.near[group]), s.load(high));
+        let before = found.clear & far.less(best_near);
+        let after = found.clear & best_far.less(near);
+        s.select(before, near, best_near).store(&mut self.near[group]);
+        s.select(before, far, best_far).store(high);
+        (before, found.candidates & !(before | after))
+    }
+
+    /// Has the number of a primitive fetched: it is far away, and asked for last.
+    #[inline(always)]
+    fn fetch_id<S: Simd>(&self, s: S, entry: u32) {
+        if Q::Query::ORDERED
+            && let Some(id) = self.leaves.prim_ids.get(entry as usize)
+        {
+            s.prefetch(id);
+        }
+    }
+
+    /// Decides for some rays of a group one by one what of a leaf they meet.
+    #[cold]
+    #[inline(never)]
+    fn ask_alone(&mut self, group: usize, rays: u32, leaf: LeafRef) {
+        let (mut rest, reach) = (rays, self.batch.block.header.reach);
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize % 16;
+            rest &= rest - 1;
+            let Some(given) = self.batch.rays.get(16 * group + lane) else { return };
+            let Some((ray, _)) = given.prepare_with(Scalar, reach) else { continue };
+            let mut query = self.batch.question.query(self.batch.block, ray.t_max);
+            if let Some(leaf) = self.leaf(group, lane) {
+                self.leaves.intersect(Scalar, leaf, &ray, &mut query);
+            }
+            let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
+            if ended {
+                self.met[group] |= 1 << lane;
+            } else if let Some((leaf, t)) = Q::best(&query) {
+                // Away from zero by more than the rounding of this.
+                let rate = f64::from(given.direction[self.packet.alike.axes[2]].abs())
+                    * f64::from(self.packet.alike.scale);
+                let (near, far) = (t.near * rate, t.far * rate);
+                self.met[group] |= 1 << lane;
+                self.blocks[group][lane] = leaf.block;
+                self.lanes[group][lane] = leaf.lanes;
+                self.near[group][lane] = f32_below(near - near.abs() * 1e-12);
+                self.packet.group(group).high[lane] = f32_above(far + far.abs() * 1e-12);
+            }
+        }
+    }
+
+    /// What a ray met.
+    #[inline(always)]
+    fn leaf(&self, group: usize, lane: usize) -> Option<LeafRef> {
+        let met = Q::Query::ORDERED && self.met[group] >> lane & 1 == 1;
+        let leaf = LeafRef { block: self.blocks[group][lane], lanes: self.lanes[group][lane] };
+        met.then_some(leaf)
+    }
+
+    /// Writes the answers. Rays that are not `sound` are not in the packet.
+    #[inline(always)]
+    fn settle(&mut self, sound: [u32; GROUPS]) {
+        for (group, sound) in sound.into_iter().enumerate() {
+            for lane in 0..16 {
+                let number = 16 * group + lane;
+                let Some(ray) = self.batch.rays.get(number) else { return };
+                if sound >> lane & 1 == 0 {
+                    self.batch.answer_alone(number);
+                } else if self.met[group] >> lane & 1 == 0 {
+                    self.batch.write(number, Q::nothing());
+                } else {
+                    let leaf =
+                        LeafRef { block: self.blocks[group][lane], lanes: self.lanes[group][lane] };
+                    match Q::of_sure(self.batch.block, ray, leaf) {
+                        Some(answer) => self.batch.write(number, answer),
+                        None => self.settle_alone(number, leaf),
+                    }
+                }
+            }
+        }
+    }
+
+    /// Answers for a ray whose hit takes more than a look.
+    #[cold]
+    #[inline(never)]
+    fn settle_alone(&mut self, number: usize, leaf: LeafRef) {
+        let Batch { block, rays, question, .. } = self.batch;
+        let Some((ray, _)) = rays[number].prepare_with(Scalar, block.header.reach) else { return };
+        let mut query = question.query(block, ray.t_max);
+        let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
+        self.batch.write(number, Q::answer(block, &ray, &mut query, ended));
     }
 }

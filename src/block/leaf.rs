@@ -52,14 +52,28 @@ impl TriangleBlock {
     /// The vertices of triangle `i < 16`, whatever the block holds.
     #[inline(always)]
     pub fn triangle(&self, i: usize) -> [[f32; 3]; 3] {
-        let (byte, shift) = nibble(i % TRIANGLES);
         let [x, y, z] = &self.vertices;
+        self.corner_numbers(i).map(|v| [x[v], y[v], z[v]])
+    }
+
+    /// The numbers of the vertices of triangle `i < 16`, each below 16 whatever the block holds.
+    #[inline(always)]
+    pub fn corner_numbers(&self, i: usize) -> [usize; 3] {
+        let (byte, shift) = nibble(i % TRIANGLES);
         let [a, b, c] = &self.corners;
-        // A nibble is below 16, so no index here can be out of range.
-        [a, b, c].map(|list| {
-            let v = usize::from(list[byte] >> shift & 15);
-            [x[v], y[v], z[v]]
-        })
+        [a, b, c].map(|list| usize::from(list[byte] >> shift & 15))
+    }
+
+    /// No corner has this number of a vertex or a larger one: 1 to 16.
+    #[inline(always)]
+    pub fn corners_below(&self) -> usize {
+        let mut largest = [0; TRIANGLES / 2];
+        for list in &self.corners {
+            for (largest, two) in largest.iter_mut().zip(list) {
+                *largest = (*largest).max(two & 15).max(two >> 4);
+            }
+        }
+        largest.into_iter().fold(0, u8::max) as usize + 1
     }
 
     /// The lanes in use, one bit each.

@@ -57,6 +57,19 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         } else {
             boxes.entered::<false>(&bundle.walls, t_bounds)
         };
+        self.go_on::<S, Q, W>(s, bundle, mask, near)
+    }
+
+    /// Goes from a bundle to the nearest of the children in the lanes of `mask`, and comes back to the others later; false
+    /// when there is no room.
+    #[inline(always)]
+    pub fn go_on<S: Width<W>, Q: Query, const W: usize>(
+        &mut self,
+        s: S,
+        bundle: &Bundle<W>,
+        mask: u32,
+        near: S::V,
+    ) -> bool {
         if mask & mask.wrapping_sub(1) == 0 {
             let only = bundle.refs.get(mask.trailing_zeros() as usize);
             self.at = only.copied().unwrap_or_else(|| self.stack.pop());

@@ -3,11 +3,11 @@
 use core::cmp::Ordering;
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
-use crate::block::leaf::Place;
+use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, block_ref};
 use crate::exact::{Distance, Meeting};
 use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
-use crate::ray::{Interval, PreparedRay};
+use crate::ray::{Interval, PreparedRay, Ray};
 
 /// Hit or miss, the primitive and the order of real arithmetic; `t` correctly rounded.
 #[derive(Clone, Copy)]
@@ -57,9 +57,17 @@ impl ExactMet {
     /// `t_error` grants at least one rounding of `t` more than the error needs, which covers the
     /// rounding of these two sums; a hundredth of it covers its own arithmetic.
     #[inline(always)]
-    fn interval(&self) -> Interval<f64> {
-        let margin = 1.01 * self.t_error;
-        Interval { near: self.t - margin, far: self.t + margin }
+    pub fn interval(&self) -> Interval<f64> {
+        interval(self.t, self.t_error)
+    }
+
+    /// Where what is met is stored, as a leaf of one lane.
+    pub fn leaf(&self) -> LeafRef {
+        let kind = match self.meeting {
+            Meeting::Triangle(_) => KIND_TRIANGLES,
+            Meeting::Sphere { .. } => KIND_SPHERES,
+        };
+        LeafRef { block: block_ref(kind, self.place.block), lanes: 1 << self.place.lane }
     }
 
     /// The meeting, if its real `t` is within the ray's limits.
@@ -143,6 +151,17 @@ impl ExactMemory {
             *self = ExactMemory { of: Some(key), t: Distance::new(&ray.line(), &met.meeting) };
         }
         self.t.as_ref()
+    }
+}
+
+impl Exact {
+    /// The answered `t` and weights of a triangle that the ray surely meets within its limits; `None` when that takes more
+    /// than a look.
+    #[inline(always)]
+    pub fn of_sure(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<(f32, [f32; 2])> {
+        let meeting = triangle::clear_plane(&ray.line(), corners)?;
+        let t = surely_rounded(interval(meeting.t, meeting.t_error), meeting.t)?;
+        Some((t, clamped_weights(meeting.weights.map(|weight| weight as f32))))
     }
 }
 
@@ -249,16 +268,11 @@ impl Decide for Exact {
 
     #[inline(always)]
     fn t(ray: &PreparedRay, met: &ExactMet, watch: &mut impl Watch) -> f32 {
-        let nearest = met.t as f32;
-        let Interval { near, far } = met.interval();
-        let rounded = if near as f32 == nearest && far as f32 == nearest {
-            nearest
-        } else {
+        surely_rounded(met.interval(), met.t).unwrap_or_else(|| {
             watch.rounding();
-            met.rounded(ray)
-        };
-        // Adding +0 turns -0 into +0.
-        rounded + 0.0
+            // Adding +0 turns -0 into +0.
+            met.rounded(ray) + 0.0
+        })
     }
 
     #[inline(always)]
@@ -274,6 +288,21 @@ fn unclear(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
         true => triangle::plane(&ray.line(), lane.corners()),
         false => triangle::meet(&ray.line(), lane.corners()),
     }
+}
+
+/// See [`ExactMet::interval`].
+#[inline(always)]
+fn interval(t: f64, t_error: f64) -> Interval<f64> {
+    let margin = 1.01 * t_error;
+    Interval { near: t - margin, far: t + margin }
+}
+
+/// The float that all numbers of an interval around `t` are rounded to, if there is one.
+#[inline(always)]
+fn surely_rounded(Interval { near, far }: Interval<f64>, t: f64) -> Option<f32> {
+    let nearest = t as f32;
+    // Adding +0 turns -0 into +0.
+    (near as f32 == nearest && far as f32 == nearest).then_some(nearest + 0.0)
 }
 
 /// Whether all of an interval lies within the limits, or only a part of it, or none.

@@ -81,6 +81,12 @@ impl Choice {
     /// Leaves out nothing.
     pub const EVERYTHING: Self = Choice { mask: 0, facing: Facing::Both, skip: NONE };
 
+    /// Whether nothing is left out.
+    #[inline(always)]
+    pub fn sees_all(&self) -> bool {
+        self.mask == 0 && self.skip == NONE && self.facing == Facing::Both
+    }
+
     /// What `options` leave of a scene with these geometries.
     #[inline(always)]
     pub fn new(options: &QueryOptions, geometries: &[Geometry], prim_limit: u32) -> Self {

@@ -63,8 +63,13 @@ pub(crate) const TINY: f32 = 1.0 / (1u128 << 100) as f32;
 #[inline(always)]
 fn depth_slack(depth: f32) -> f32 {
     // Infinite depths stay as they are.
-    depth.abs().min(f32::MAX) * (4.0 * UNIT32) + TINY
+    depth.abs().min(f32::MAX) * DEPTH_SLACK + TINY
 }
+
+pub(super) const DEPTH_SLACK: f32 = 4.0 * UNIT32;
+
+/// What x and y of a sheared vertex may be off for each unit of depth and of the larger slope.
+pub(super) const BLUR: f32 = 5.5 * UNIT32;
 
 impl Shear {
     /// Above the depth of all `t` up to `t_bound`, from the origin.
@@ -77,10 +82,15 @@ impl Shear {
 
 /// A component below this part of the largest moves the ray by less than what boxes are padded by: it counts
 /// as this much, so that its reciprocal is finite.
-const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
+pub(super) const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
 
 /// Ordinary scenes, origins and directions are smaller than this, and not all smaller than its reciprocal.
-const ORDINARY: f32 = (1u64 << 60) as f32;
+pub(super) const ORDINARY: f32 = (1u64 << 60) as f32;
+
+#[inline(always)]
+pub(super) fn is_ordinary(x: f32) -> bool {
+    (1.0 / ORDINARY..ORDINARY).contains(&x)
+}
 
 const EXPONENT: u32 = f32::INFINITY.to_bits();
 
@@ -88,6 +98,12 @@ const EXPONENT: u32 = f32::INFINITY.to_bits();
 #[inline(always)]
 fn exponent_bits(x: f32) -> u32 {
     x.to_bits() & EXPONENT
+}
+
+/// The power of two that brings an ordinary number, and all that are not larger, below 1.
+#[inline(always)]
+pub(super) fn scale_below(x: f32) -> f32 {
+    f32::from_bits((253 << 23) - exponent_bits(x))
 }
 
 /// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
@@ -172,13 +188,12 @@ impl Ray {
         // These comparisons refuse a NaN, which may have been lost above.
         let within = splat(ORDINARY);
         let finite = distance.less(within) & speed.less(within) & 7 == 7 && t_min <= t_max;
-        let ordinary = |x: f32| (1.0 / ORDINARY..ORDINARY).contains(&x);
-        if !(finite && ordinary(fastest) && ordinary(reach)) {
+        if !(finite && is_ordinary(fastest) && is_ordinary(reach)) {
             return None;
         }
         // 2^e above all coordinates and 2^l below the fastest component: by exponents, whose zero is 127.
         let (e, l) = (exponent_bits(reach), exponent_bits(fastest));
-        let scale = f32::from_bits((253 << 23) - e);
+        let scale = scale_below(reach);
         let t_scale = f32::from_bits((126 << 23) + l - e);
         let (t_min_below, t_max_above) = (below(t_min, t_scale), above(t_max, t_scale));
         let scales = Scales { t: t_scale, space: scale };
@@ -347,7 +362,7 @@ impl Shear {
         Shear {
             axes,
             slope,
-            blur: 5.5 * UNIT32 * if a > b { a } else { b },
+            blur: BLUR * if a > b { a } else { b },
             depth_scale: signed(scale),
             origin_depth: signed(origin[depth]),
             depth_rate,

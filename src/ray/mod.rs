@@ -1,13 +1,17 @@
 //! Rays, hits, and what a traversal knows about a ray before it starts.
 
+mod abreast;
+mod alike;
 #[cfg(test)]
 mod bounds;
 mod frame;
 mod packet;
 mod slab;
 
+pub(crate) use abreast::{Abreast, Sixteen};
+pub(crate) use alike::Alike;
 pub(crate) use frame::{Late, PreparedRay, TINY};
-pub(crate) use packet::{GROUPS, PACKET, SlabPacket};
+pub(crate) use packet::{GROUPS, RayPacket};
 pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".

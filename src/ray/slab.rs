@@ -42,6 +42,11 @@ pub(crate) struct NarrowSlab {
     pub(super) backwards: [bool; 3],
 }
 
+/// The padding of walls: of the origin's coordinate, of the reach in the direction's length, and of the reach.
+pub(super) const RELATIVE_PAD: f32 = 6.0 * UNIT32;
+pub(super) const NEGLIGIBLE: f32 = 1.0 / (1u64 << 57) as f32;
+pub(super) const CONSTANT_PAD: f32 = 12.0 * UNIT32;
+
 /// From given numbers to the frame's: powers of two.
 #[derive(Clone, Copy)]
 pub(super) struct Scales {
@@ -72,13 +77,12 @@ impl NarrowSlab {
         t_min: f32,
         backwards: [bool; 3],
     ) -> Self {
-        const NEGLIGIBLE: f32 = 1.0 / (1u64 << 57) as f32;
         // What can be computed before the reciprocals are there, which takes the longest.
         let scale = s.splat(scales.t);
         let ahead = origin.mul(scale).flipped_by(direction);
-        let relative = s.splat(6.0 * UNIT32);
+        let relative = s.splat(RELATIVE_PAD);
         let pad = ahead.abs().mul(relative).add(s.splat(NEGLIGIBLE * (reach * scales.t)));
-        let constant = s.splat(12.0 * UNIT32 * (reach * scales.space));
+        let constant = s.splat(CONSTANT_PAD * (reach * scales.space));
         let mut slab = NarrowSlab { t_min, backwards, ..Self::BLANK };
         inverse.mul(scale).with_sign_of(direction).store(&mut slab.reciprocal);
         inverse.mul(ahead.add(pad)).add(constant).store(&mut slab.near_shift);

@@ -4,7 +4,7 @@
 
 use crate::math::rounding::UNIT32;
 use crate::ray::{PreparedRay, TINY};
-use crate::simd::{Lanes, Width, mul_sub};
+use crate::simd::{Lanes, Width, mul_add, mul_sub};
 
 /// Depths of vertices: how far along the ray's axis they are.
 #[derive(Clone, Copy)]
@@ -39,8 +39,6 @@ pub(super) struct Across<V> {
     /// Minus x, and minus y: areas are the same.
     pub x: V,
     pub y: V,
-    /// The larger distance from the ray along x and y.
-    pub size: V,
 }
 
 impl<V: Copy> Across<V> {
@@ -63,7 +61,16 @@ impl<V: Copy> Across<V> {
         let y = mul_sub::<V, FUSED, N>(s.load(&vertices[ky]), scale, from_y);
         let x = mul_sub::<V, FUSED, N>(along.depth, s.splat(slope_x), x);
         let y = mul_sub::<V, FUSED, N>(along.depth, s.splat(slope_y), y);
-        Across { x, y, size: x.abs().max(y.abs()) }
+        Across { x, y }
+    }
+
+    /// The larger distance from the ray along x and y.
+    #[inline(always)]
+    pub fn size<const N: usize>(&self) -> V
+    where
+        V: Lanes<N>,
+    {
+        self.x.abs().max(self.y.abs())
     }
 }
 
@@ -83,29 +90,34 @@ pub(super) fn shared_error(ray: &PreparedRay, deepest: f32) -> f32 {
     ray.shear.blur * deepest
 }
 
-/// What an area may be off, by the largest [size](Sheared::size) of the three vertices.
+/// What an area may be off, by the largest [size](Across::size) of the three vertices or more.
 ///
 /// With `e` what a coordinate may be off, `e (4 size + 2 e) + 4.5 u size^2`, as a polynomial in `size`.
 #[derive(Clone, Copy)]
-pub(super) struct AreaError {
-    pub linear: f32,
-    pub constant: f32,
+pub(super) struct AreaError<V> {
+    linear: V,
+    constant: V,
 }
 
-impl AreaError {
-    const SQUARE: f32 = 14.6 * UNIT32;
-
+impl<V: Copy> AreaError<V> {
     #[inline(always)]
-    pub fn new(shared_error: f32) -> Self {
-        let root = 1.42 * shared_error;
-        AreaError { linear: 4.01 * shared_error, constant: root * root + TINY }
+    pub fn new<S: Width<N, V = V>, const N: usize>(s: S, shared_error: V) -> Self
+    where
+        V: Lanes<N>,
+    {
+        let root = shared_error.mul(s.splat(1.42));
+        let constant = root.mul(root).add(s.splat(TINY));
+        AreaError { linear: shared_error.mul(s.splat(4.01)), constant }
     }
 
     #[inline(always)]
-    pub fn of<S: Width<N>, const FUSED: bool, const N: usize>(&self, s: S, size: S::V) -> S::V {
-        let (square, linear, constant) = (Self::SQUARE, -self.linear, -self.constant);
-        let slope = mul_sub::<S::V, FUSED, N>(size, s.splat(square), s.splat(linear));
-        mul_sub::<S::V, FUSED, N>(size, slope, s.splat(constant))
+    pub fn of<S: Width<N, V = V>, const FUSED: bool, const N: usize>(&self, s: S, size: V) -> V
+    where
+        V: Lanes<N>,
+    {
+        let square = s.splat(14.6 * UNIT32);
+        let slope = mul_add::<V, FUSED, N>(size, square, self.linear);
+        mul_add::<V, FUSED, N>(size, slope, self.constant)
     }
 }
 
@@ -119,17 +131,13 @@ pub(super) struct Areas<V> {
 
 impl<V: Copy> Areas<V> {
     #[inline(always)]
-    pub fn new<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
-        s: S,
-        error: &AreaError,
-        [a, b, c]: &[Across<V>; 3],
-    ) -> Self
+    pub fn new<const FUSED: bool, const N: usize>([a, b, c]: &[Across<V>; 3], error: V) -> Self
     where
         V: Lanes<N>,
     {
         let over =
             [area::<V, FUSED, N>(b, c), area::<V, FUSED, N>(c, a), area::<V, FUSED, N>(a, b)];
-        Areas { over, error: error.of::<S, FUSED, N>(s, a.size.max(b.size).max(c.size)) }
+        Areas { over, error }
     }
 
     /// The least and the largest of the three.

@@ -9,6 +9,7 @@ use raykern_harness::make::Random;
 use raykern_harness::search::{Worst, samples};
 
 use super::sphere::{chord, sphere};
+
 use super::triangle::single::{Sieved, area, area_error, coordinate_error, sheared, sieve};
 use crate::exact::{Distance, Line, Meeting};
 use crate::interval;
@@ -18,12 +19,12 @@ use crate::ray::{PreparedRay, Ray};
 /// Exponents of coordinates: all, either end, ordinary ones, and nearly one size.
 const RANGES: [[i32; 2]; 6] = [[-149, 127], [-149, -120], [100, 127], [-20, 20], [-2, 2], [-2, 2]];
 
-fn mix(a: [f32; 3], b: [f32; 3], s: f64) -> [f32; 3] {
+pub(super) fn mix(a: [f32; 3], b: [f32; 3], s: f64) -> [f32; 3] {
     [0, 1, 2].map(|k| (f64::from(a[k]) * (1.0 - s) + f64::from(b[k]) * s) as f32)
 }
 
 /// A weight: often 0 or 1 or close to them, at times outside.
-fn weight(random: &mut Random) -> f64 {
+pub(super) fn weight(random: &mut Random) -> f64 {
     let near = 2f64.powi(-(random.below(30) as i32)) * random.between(-1.0, 1.0);
     match random.below(4) {
         0 => 0.0,
@@ -46,7 +47,7 @@ fn aimed(random: &mut Random, origin: [f32; 3], target: [f32; 3]) -> Ray {
 }
 
 /// Coordinates of one case, and how far the rest of its scene reaches.
-fn points<const N: usize>(random: &mut Random) -> ([[f32; 3]; N], f32) {
+pub(super) fn points<const N: usize>(random: &mut Random) -> ([[f32; 3]; N], f32) {
     let range = RANGES[random.below(RANGES.len())];
     let middle = [0, 1, 2].map(|_| random.wild(range));
     let spread = 2f64.powi(-(random.below(26) as i32)) as f32;
@@ -76,7 +77,7 @@ fn limited(random: &mut Random, ray: Ray, t: Option<f64>) -> Ray {
     }
 }
 
-fn is_within(line: &Line, meeting: &Meeting, ray: &PreparedRay) -> bool {
+pub(super) fn is_within(line: &Line, meeting: &Meeting, ray: &PreparedRay) -> bool {
     Distance::new(line, meeting).is_some_and(|t| {
         t.compare_with(ray.given.t_min) != Ordering::Less
             && t.compare_with(ray.given.t_max) != Ordering::Greater

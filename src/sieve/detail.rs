@@ -24,7 +24,7 @@ pub(crate) struct TriangleDetail {
 
 /// What the filter knows of a triangle that it does not reject.
 pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
-    let middle = Middle::of(ray, &Aabb::around(&corners));
+    let middle = Middle::of_one(ray, &Aabb::around(&corners));
     let One { areas, meetings } = One::new(ray, &middle, corners);
     let [[over_a], [over_b], [over_c]] = areas.over;
     let ([area_error], [size_of_total], [rise]) = (areas.error, meetings.total, meetings.rise);
@@ -34,7 +34,7 @@ pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetai
     // The total carries the errors of three areas, and less than as much again of its own.
     let is_clear = size_of_total > 6.0 * area_error;
     // A NaN, from 0 / 0, loses to the depths of the vertices.
-    let depth = (middle.depth + rise / size_of_total).max(nearest).min(farthest);
+    let depth = (middle.depth[0] + rise / size_of_total).max(nearest).min(farthest);
     let rate = ray.shear.depth_rate;
     let (t, t_error) = match plane(ray, corners) {
         Some((t, t_error)) => ((t * rate).max(nearest).min(farthest) / rate, t_error),

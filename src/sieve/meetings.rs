@@ -4,54 +4,91 @@ use super::areas::Areas;
 use crate::math::Aabb;
 use crate::math::rounding::UNIT32;
 use crate::ray::{PreparedRay, TINY};
-use crate::simd::{Lanes, Width, mul_add, mul_sub};
+use crate::simd::{Lanes, Scalar, Width, mul_add, mul_sub};
 
-/// The middle of a box along the ray: depths near it are small numbers, wherever the ray starts.
+/// The middle of a box along rays: depths near it are small numbers, wherever a ray starts.
 #[derive(Clone, Copy)]
-pub(super) struct Middle {
-    /// Its depth from the frame's zero, and from the ray's origin.
+pub(super) struct Middle<V> {
+    /// Its depth from the frame's zero, and from the origin of each ray.
     pub raw: f32,
-    pub depth: f32,
+    pub depth: V,
     /// No vertex is further from it.
     pub half: f32,
-    /// The depth of the vertex that is deepest before or behind the ray's origin.
-    pub deepest: f32,
+    /// The depth of the vertex that is deepest before or behind a ray's origin.
+    pub deepest: V,
 }
 
-impl Middle {
+impl<V: Copy> Middle<V> {
+    /// For rays of one frame along the axis `k`, whose `depth_scale` brings given coordinates to depths.
     #[inline(always)]
-    pub fn of(ray: &PreparedRay, aabb: &Aabb) -> Self {
-        let k = ray.shear.axes[2];
+    pub fn of<S: Width<N, V = V>, const N: usize>(
+        s: S,
+        (k, depth_scale): (usize, f32),
+        origin_depth: V,
+        aabb: &Aabb,
+    ) -> Self
+    where
+        V: Lanes<N>,
+    {
         // Halves, as a sum of given coordinates may overflow.
-        let scale = 0.5 * ray.shear.depth_scale;
+        let scale = 0.5 * depth_scale;
         let (lower, upper) = (aabb.lower[k] * scale, aabb.upper[k] * scale);
         let (raw, half) = (lower + upper, (upper - lower).abs());
-        let depth = raw - ray.shear.origin_depth;
+        let depth = s.splat(raw).sub(origin_depth);
         // What half and middle were rounded by, and what fell below the frame's least float.
         let slack = (lower.abs() + upper.abs()) * (4.0 * UNIT32) + TINY;
-        Middle { raw, depth, half: half + slack, deepest: depth.abs() + half }
+        Middle { raw, depth, half: half + slack, deepest: depth.abs().add(s.splat(half)) }
     }
 
-    /// What is beyond these depths from here is not within `t_min` and `t_bound`.
+    /// What is beyond these depths from here is beyond those from the origins.
     #[inline(always)]
-    pub fn window(&self, ray: &PreparedRay, t_bound: f32) -> [f32; 2] {
-        let slack = self.depth.abs() * (3.0 * UNIT32);
-        let [low, high] = [ray.shear.low, ray.shear.high(t_bound)];
-        [(low - self.depth) - slack, (high - self.depth) + slack]
+    pub fn window<S: Width<N, V = V>, const N: usize>(&self, s: S, [low, high]: [V; 2]) -> [V; 2]
+    where
+        V: Lanes<N>,
+    {
+        let slack = self.slack(s);
+        [low.sub(self.depth).sub(slack), high.sub(self.depth).add(slack)]
+    }
+
+    /// What is within these depths from here surely is within those from the origins.
+    #[inline(always)]
+    pub fn inner_window<S: Width<N, V = V>, const N: usize>(
+        &self,
+        s: S,
+        [low, high]: [V; 2],
+    ) -> [V; 2]
+    where
+        V: Lanes<N>,
+    {
+        let slack = self.slack(s);
+        [low.sub(self.depth).add(slack), high.sub(self.depth).sub(slack)]
+    }
+
+    /// What a depth from here may be off for the rounding of `depth`.
+    #[inline(always)]
+    fn slack<S: Width<N, V = V>, const N: usize>(&self, s: S) -> V
+    where
+        V: Lanes<N>,
+    {
+        self.depth.abs().mul(s.splat(3.0 * UNIT32))
     }
 
     /// Whether all of the box is beyond a window: where areas are in doubt, as from very far away, this is not.
     #[inline(always)]
-    pub fn is_beyond(&self, [low, high]: [f32; 2]) -> bool {
-        (low > self.half) | (high < -self.half)
+    pub fn is_beyond<S: Width<N, V = V>, const N: usize>(&self, s: S, [low, high]: [V; 2]) -> u32
+    where
+        V: Lanes<N>,
+    {
+        s.splat(self.half).less(low) | high.less(s.splat(-self.half))
     }
+}
 
-    /// What is within these depths from here surely is within the limits of the ray.
+impl Middle<[f32; 1]> {
+    /// For one ray.
     #[inline(always)]
-    pub fn inner_window(&self, ray: &PreparedRay) -> [f32; 2] {
-        let slack = self.depth.abs() * (3.0 * UNIT32);
-        let [low, high] = ray.inner_depths();
-        [(low - self.depth) + slack, (high - self.depth) - slack]
+    pub fn of_one(ray: &PreparedRay, aabb: &Aabb) -> Self {
+        let shear = &ray.shear;
+        Middle::of(Scalar, (shear.axes[2], shear.depth_scale), [shear.origin_depth], aabb)
     }
 }
 
@@ -68,40 +105,35 @@ pub(super) struct Meetings<V> {
 }
 
 impl<V: Copy> Meetings<V> {
-    /// `raw` are the depths of the corners from the frame's zero.
+    /// For a box that is twice `half` deep; `depths` are those of the corners from its middle.
     #[inline(always)]
     pub fn new<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
         s: S,
-        middle: &Middle,
+        half: f32,
         areas: &Areas<V>,
-        raw: &[V; 3],
+        depths: [V; 3],
     ) -> Self
     where
         V: Lanes<N>,
     {
         let [over_a, over_b, over_c] = areas.over;
-        let [a, b, c] = raw;
+        let [a, b, c] = depths;
         let total = over_a.add(over_b).add(over_c);
-        let from_middle = s.splat(middle.raw);
-        let rise = over_a.mul(a.sub(from_middle));
-        let rise = mul_add::<V, FUSED, N>(over_b, b.sub(from_middle), rise);
-        let rise = mul_add::<V, FUSED, N>(over_c, c.sub(from_middle), rise).flipped_by(total);
-        let error = areas.error.mul(s.splat(16.0 * middle.half)).add(s.splat(TINY));
+        let rise = over_a.mul(a);
+        let rise = mul_add::<V, FUSED, N>(over_b, b, rise);
+        let rise = mul_add::<V, FUSED, N>(over_c, c, rise).flipped_by(total);
+        let error = areas.error.mul(s.splat(16.0 * half)).add(s.splat(TINY));
         Meetings { total: total.abs(), rise, error }
     }
 
     /// How far the meetings are before each of these depths, times `total`.
     #[inline(always)]
-    fn before<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
-        &self,
-        s: S,
-        [low, high]: [f32; 2],
-    ) -> [V; 2]
+    fn before<const FUSED: bool, const N: usize>(&self, [low, high]: [V; 2]) -> [V; 2]
     where
         V: Lanes<N>,
     {
-        let low = mul_sub::<V, FUSED, N>(self.total, s.splat(low), self.rise);
-        [low, mul_sub::<V, FUSED, N>(self.total, s.splat(high), self.rise)]
+        let low = mul_sub::<V, FUSED, N>(self.total, low, self.rise);
+        [low, mul_sub::<V, FUSED, N>(self.total, high, self.rise)]
     }
 
     /// Lanes that the ray surely does not meet between these depths.
@@ -109,12 +141,12 @@ impl<V: Copy> Meetings<V> {
     pub fn outside<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
         &self,
         s: S,
-        depths: [f32; 2],
+        depths: [V; 2],
     ) -> u32
     where
         V: Lanes<N>,
     {
-        let [low, high] = self.before::<S, FUSED, N>(s, depths);
+        let [low, high] = self.before::<FUSED, N>(depths);
         self.error.less(low) | high.less(s.splat(0.0).sub(self.error))
     }
 
@@ -123,12 +155,12 @@ impl<V: Copy> Meetings<V> {
     pub fn inside<S: Width<N, V = V>, const FUSED: bool, const N: usize>(
         &self,
         s: S,
-        depths: [f32; 2],
+        depths: [V; 2],
     ) -> u32
     where
         V: Lanes<N>,
     {
-        let [low, high] = self.before::<S, FUSED, N>(s, depths);
+        let [low, high] = self.before::<FUSED, N>(depths);
         low.less(s.splat(0.0).sub(self.error)) & self.error.less(high)
     }
 

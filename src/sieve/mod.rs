@@ -1,5 +1,8 @@
 //! The first look at the primitives of a leaf block, in `f32`: it only rejects.
 
+mod abreast;
+#[cfg(test)]
+mod abreast_bounds;
 mod areas;
 #[cfg(test)]
 mod bounds;
@@ -9,6 +12,7 @@ mod sphere;
 mod triangle;
 mod vector;
 
+pub(crate) use abreast::{Aim, Found, Opened, Sheared};
 pub(crate) use detail::detail;
 pub(crate) use sphere::{SphereDetail, sphere};
 pub(crate) use triangle::{Triangles, triangles};

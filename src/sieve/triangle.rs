@@ -16,7 +16,7 @@ pub(crate) struct Triangles<V> {
     pub candidates: u32,
     /// Those between whose edges the ray's line surely passes.
     pub sure: u32,
-    middle: Middle,
+    middle: Middle<[f32; 1]>,
     meetings: Meetings<V>,
 }
 
@@ -24,7 +24,9 @@ impl<V: Lanes<16>> Triangles<V> {
     /// The sure lanes whose real `t` surely is within the ray's limits.
     #[inline(always)]
     pub fn inside<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay) -> u32 {
-        self.sure & self.meetings.inside::<S, true, 16>(s, self.middle.inner_window(ray))
+        let [low, high] = ray.inner_depths();
+        let window = self.middle.inner_window(Scalar, [[low], [high]]);
+        self.sure & self.meetings.inside::<S, true, 16>(s, splat(s, window))
     }
 
     /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
@@ -40,7 +42,8 @@ impl<V: Lanes<16>> Triangles<V> {
     /// The lanes whose meeting may come up to `t_bound`. Never fused, as this serves both precisions.
     #[inline(always)]
     pub fn up_to<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
-        !self.meetings.outside::<S, false, 16>(s, self.middle.window(ray, t_bound))
+        let window = self.middle.window(Scalar, limits(ray, t_bound));
+        !self.meetings.outside::<S, false, 16>(s, splat(s, window))
     }
 
     /// In memory, for those whom registers cannot be lent to.
@@ -74,21 +77,24 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     block: &TriangleBlock,
     lanes: u32,
 ) -> Triangles<<S as Width<16>>::V> {
-    let middle = Middle::of(ray, &block.aabb);
-    let window = middle.window(ray, t_bound);
-    let lanes = if middle.is_beyond(window) { 0 } else { lanes };
+    let middle = Middle::of_one(ray, &block.aabb);
+    let window = middle.window(Scalar, limits(ray, t_bound));
+    let lanes = if middle.is_beyond(Scalar, window) == 0 { lanes } else { 0 };
     if S::FEW > 0 && lanes.count_ones() <= S::FEW {
         return few(ray, middle, window, block, lanes).loaded(s);
     }
-    let error = AreaError::new(shared_error(ray, middle.deepest));
     let along = Along::new(s, ray, &block.vertices);
     let across = Across::new::<S, FREE, 16>(s, ray, &block.vertices, &along);
+    let from_middle = along.raw.sub(Width::<16>::splat(s, middle.raw));
     let [a, b, c] = &block.corners;
     let corners = [corner(s, &across, a), corner(s, &across, b), corner(s, &across, c)];
-    let raw = [s.corners(along.raw, a), s.corners(along.raw, b), s.corners(along.raw, c)];
-    let areas = Areas::new::<S, FREE, 16>(s, &error, &corners);
-    let meetings = Meetings::new::<S, FREE, 16>(s, &middle, &areas, &raw);
-    let outside = areas.outside(s) | meetings.outside::<S, FREE, 16>(s, window);
+    let depths = [s.corners(from_middle, a), s.corners(from_middle, b), s.corners(from_middle, c)];
+    let size = across.size();
+    let size = s.corners(size, a).max(s.corners(size, b)).max(s.corners(size, c));
+    let error = AreaError::new(s, Width::<16>::splat(s, shared_error(ray, middle.deepest[0])));
+    let areas = Areas::new::<FREE, 16>(&corners, error.of::<S, FREE, 16>(s, size));
+    let meetings = Meetings::new::<S, FREE, 16>(s, middle.half, &areas, depths);
+    let outside = areas.outside(s) | meetings.outside::<S, FREE, 16>(s, splat(s, window));
     let candidates = lanes & !outside;
     Triangles { candidates, sure: candidates & areas.sure(s), middle, meetings }
 }
@@ -100,19 +106,27 @@ fn corner<S: Simd>(
     vertices: &Across<<S as Width<16>>::V>,
     list: &[u8; 8],
 ) -> Across<<S as Width<16>>::V> {
-    Across {
-        x: s.corners(vertices.x, list),
-        y: s.corners(vertices.y, list),
-        size: s.corners(vertices.size, list),
-    }
+    Across { x: s.corners(vertices.x, list), y: s.corners(vertices.y, list) }
+}
+
+/// Depths from the origin between which is all that is of interest.
+#[inline(always)]
+fn limits(ray: &PreparedRay, t_bound: f32) -> [[f32; 1]; 2] {
+    [[ray.shear.low], [ray.shear.high(t_bound)]]
+}
+
+/// A window of one ray in all lanes.
+#[inline(always)]
+fn splat<S: Width<16>>(s: S, [[low], [high]]: [[f32; 1]; 2]) -> [S::V; 2] {
+    [s.splat(low), s.splat(high)]
 }
 
 /// The filter, lane by lane.
 #[inline(never)]
 fn few(
     ray: &PreparedRay,
-    middle: Middle,
-    window: [f32; 2],
+    middle: Middle<[f32; 1]>,
+    window: [[f32; 1]; 2],
     block: &TriangleBlock,
     lanes: u32,
 ) -> Triangles<[f32; 16]> {
@@ -140,12 +154,15 @@ pub(super) struct One {
 impl One {
     /// For a box that holds it.
     #[inline(always)]
-    pub fn new(ray: &PreparedRay, middle: &Middle, corners: [[f32; 3]; 3]) -> One {
-        let error = AreaError::new(shared_error(ray, middle.deepest));
+    pub fn new(ray: &PreparedRay, middle: &Middle<[f32; 1]>, corners: [[f32; 3]; 3]) -> One {
         let corners = corners.map(|v| sheared(ray, v));
-        let (along, across) = (corners.map(|v| v.0.raw), corners.map(|v| v.1));
-        let areas = Areas::new::<Scalar, false, 1>(Scalar, &error, &across);
-        let meetings = Meetings::new::<Scalar, false, 1>(Scalar, middle, &areas, &along);
+        let depths = corners.map(|v| [v.0.raw[0] - middle.raw]);
+        let across = corners.map(|v| v.1);
+        let [a, b, c] = across.map(|v| v.size());
+        let error = AreaError::new(Scalar, [shared_error(ray, middle.deepest[0])]);
+        let error = error.of::<Scalar, false, 1>(Scalar, a.max(b).max(c));
+        let areas = Areas::new::<false, 1>(&across, error);
+        let meetings = Meetings::new::<Scalar, false, 1>(Scalar, middle.half, &areas, depths);
         One { areas, meetings }
     }
 }
@@ -160,7 +177,7 @@ pub(super) fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> (Along<[f32; 1]>, 
 #[cfg(test)]
 pub(super) mod single {
     use super::super::detail::{TriangleDetail, detail};
-    use super::{Across, Along, AreaError, Middle, One, PreparedRay, Scalar, shared_error};
+    use super::{Across, Along, AreaError, Middle, One, PreparedRay, Scalar, limits, shared_error};
     use crate::math::Aabb;
     use crate::math::rounding::UNIT32;
 
@@ -185,7 +202,7 @@ pub(super) mod single {
     }
 
     pub fn area_error(ray: &PreparedRay, size: f32, deepest: f32) -> f32 {
-        let error = AreaError::new(shared_error(ray, deepest));
+        let error = AreaError::new(Scalar, [shared_error(ray, deepest)]);
         error.of::<Scalar, false, 1>(Scalar, [size])[0]
     }
 
@@ -204,10 +221,12 @@ pub(super) mod single {
     }
 
     pub fn sieve(ray: &PreparedRay, t_bound: f32, corners: [[f32; 3]; 3]) -> Sieved {
-        let middle = Middle::of(ray, &Aabb::around(&corners));
+        let middle = Middle::of_one(ray, &Aabb::around(&corners));
         let One { areas, meetings } = One::new(ray, &middle, corners);
-        let outside = meetings.outside::<_, false, 1>(Scalar, middle.window(ray, t_bound));
-        let inside = meetings.inside::<_, false, 1>(Scalar, middle.inner_window(ray));
+        let outside =
+            meetings.outside::<_, false, 1>(Scalar, middle.window(Scalar, limits(ray, t_bound)));
+        let inner = middle.inner_window(Scalar, ray.inner_depths().map(|depth| [depth]));
+        let inside = meetings.inside::<_, false, 1>(Scalar, inner);
         let sure = areas.sure(Scalar) != 0;
         let ([total], [rise], [error]) = (meetings.total, meetings.rise, meetings.error);
         Sieved {

@@ -74,6 +74,36 @@ pub(crate) trait Width<const N: usize>: Copy {
     type V: Lanes<N>;
     fn splat(self, x: f32) -> Self::V;
     fn load(self, lanes: &[f32; N]) -> Self::V;
+    /// `chosen` in the lanes of `mask`, `other` in the rest.
+    #[inline(always)]
+    fn select(self, mask: u32, chosen: Self::V, other: Self::V) -> Self::V {
+        let (mut lanes, mut others) = ([0.0; N], [0.0; N]);
+        chosen.store(&mut lanes);
+        other.store(&mut others);
+        for (i, (lane, other)) in lanes.iter_mut().zip(others).enumerate() {
+            *lane = if mask >> i & 1 == 1 { *lane } else { other };
+        }
+        self.load(&lanes)
+    }
+
+    /// The largest lane, of which none is a NaN.
+    #[inline(always)]
+    fn largest(self, v: Self::V) -> f32 {
+        let mut lanes = [0.0; N];
+        v.store(&mut lanes);
+        lanes
+            .into_iter()
+            .fold(f32::NEG_INFINITY, |largest, x| if x > largest { x } else { largest })
+    }
+
+    /// Writes `word` into the lanes of `mask`.
+    #[inline(always)]
+    fn set_words(self, mask: u32, word: u32, words: &mut [u32; N]) {
+        for (i, place) in words.iter_mut().enumerate() {
+            *place = if mask >> i & 1 == 1 { word } else { *place };
+        }
+    }
+
     /// Writes the words of `mask` in order to the front of `out`, and anything behind them.
     #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]) {

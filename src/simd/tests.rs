@@ -70,7 +70,24 @@ impl Kernel for Compare {
         let expected = Scalar.corners(*table, &list);
         assert_eq!(picked.map(f32::to_bits), expected.map(f32::to_bits), "{table:x?} {list:x?}");
         assert_eq!(kept(s, &self.0), kept(Scalar, &self.0), "keep_up_to");
+        masked(s, &self.0);
     }
+}
+
+/// What a mask says of sixteen lanes.
+#[inline(always)]
+fn masked<S: Width<16>>(s: S, input: &Input) {
+    let ([a, b, _], mask) = (&input.lanes, input.bits as u32 & 0xFFFF);
+    let picked = stored(s.select(mask, s.load(a), s.load(b))).map(f32::to_bits);
+    assert_eq!(picked, Scalar.select(mask, *a, *b).map(f32::to_bits), "select {mask:x}");
+    let numbers = a.map(|x| if x.is_nan() { 0.5 } else { x });
+    let (largest, expected) = (s.largest(s.load(&numbers)), Scalar.largest(numbers));
+    // Zeros of both signs are equally large.
+    assert_eq!(largest, expected, "largest of {numbers:?}");
+    let (mut words, mut expected) = (b.map(f32::to_bits), b.map(f32::to_bits));
+    s.set_words(mask, 7, &mut words);
+    Scalar.set_words(mask, 7, &mut expected);
+    assert_eq!(words, expected, "set_words {mask:x}");
 }
 
 #[inline(always)]

@@ -61,6 +61,26 @@ doubled! {
     Avx2 16 of 8 F8,
 
     #[inline(always)]
+    fn select(self, mask: u32, chosen: Two<F8>, other: Two<F8>) -> Two<F8> {
+        Two(other.0.replaced(mask, chosen.0), other.1.replaced(mask >> 8, chosen.1))
+    }
+
+    #[inline(always)]
+    fn largest(self, v: Two<F8>) -> f32 {
+        v.0.max(v.1).largest()
+    }
+
+    #[inline(always)]
+    fn set_words(self, mask: u32, word: u32, words: &mut [u32; 16]) {
+        // SAFETY: the token proves AVX2; the array has 16 words.
+        unsafe {
+            let (all, words) = (_mm256_set1_epi32(word as i32), words.as_mut_ptr().cast::<i32>());
+            _mm256_maskstore_epi32(words, lanes_of(mask), all);
+            _mm256_maskstore_epi32(words.add(8), lanes_of(mask >> 8), all);
+        }
+    }
+
+    #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; 16], out: &mut [MaybeUninit<u32>; 16]) {
         let (low, high) = (mask & 0xFF, mask >> 8 & 0xFF);
         // SAFETY: the token proves AVX2; both arrays have 16 words, and a half has eight at most.
@@ -103,6 +123,24 @@ doubled! {
 }
 
 impl F8 {
+    /// This, with the lanes of `mask` from `by`.
+    #[inline(always)]
+    fn replaced(self, mask: u32, by: F8) -> F8 {
+        // SAFETY: a value of this type proves AVX2.
+        F8(unsafe { _mm256_blendv_ps(self.0, by.0, _mm256_castsi256_ps(lanes_of(mask))) })
+    }
+
+    /// The largest lane, of which none is a NaN.
+    #[inline(always)]
+    fn largest(self) -> f32 {
+        // SAFETY: a value of this type proves AVX2.
+        unsafe {
+            let v = _mm_max_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+            let v = _mm_max_ps(v, _mm_movehl_ps(v, v));
+            _mm_cvtss_f32(_mm_max_ss(v, _mm_movehdup_ps(v)))
+        }
+    }
+
     /// See [`Width::sort`].
     #[inline(always)]
     pub fn sort(
@@ -121,6 +159,20 @@ impl F8 {
             let count = mask.count_ones();
             sort::sort(near, words, count, near_out.as_mut_ptr(), words_out.as_mut_ptr())
         }
+    }
+}
+
+/// All bits in the lanes of `mask`, none in the others.
+///
+/// # Safety
+///
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn lanes_of(mask: u32) -> __m256i {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let bits = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+        _mm256_cmpeq_epi32(_mm256_and_si256(_mm256_set1_epi32(mask as i32), bits), bits)
     }
 }
 

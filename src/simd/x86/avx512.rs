@@ -62,6 +62,27 @@ width! {
     Avx512 16 F16 _mm512_set1_ps _mm512_loadu_ps
 
     #[inline(always)]
+    fn select(self, mask: u32, chosen: F16, other: F16) -> F16 {
+        // SAFETY: the token proves AVX-512 F.
+        F16(unsafe { _mm512_mask_mov_ps(other.0, mask as __mmask16, chosen.0) })
+    }
+
+    #[inline(always)]
+    fn largest(self, v: F16) -> f32 {
+        // SAFETY: the token proves AVX-512 F.
+        unsafe { _mm512_reduce_max_ps(v.0) }
+    }
+
+    #[inline(always)]
+    fn set_words(self, mask: u32, word: u32, words: &mut [u32; 16]) {
+        // SAFETY: the token proves AVX-512 F; the array has 16 words.
+        unsafe {
+            let all = _mm512_set1_epi32(word as i32);
+            _mm512_mask_storeu_epi32(words.as_mut_ptr().cast(), mask as __mmask16, all);
+        }
+    }
+
+    #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; 16], out: &mut [MaybeUninit<u32>; 16]) {
         // SAFETY: the token proves AVX-512 F; both arrays have 16 words.
         unsafe {
