@@ -14,13 +14,16 @@ use crate::math::Aabb;
 use crate::ray::{Abreast, Alike, Ray};
 use crate::simd::Scalar;
 
-/// A packet of rays from nearly one place, each to somewhere on the triangle or beside it.
+/// A packet of rays from nearly one place, each to somewhere on the triangle or beside it, not far from each other.
 fn packet(random: &mut Random, origin: [f32; 3], corners: [[f32; 3]; 3]) -> [Ray; 16] {
     let [a, b, c] = corners;
     let away = 2f32.powi(-(random.below(12) as i32 + 3));
+    let apart = 2f64.powi(-(random.below(8) as i32));
+    let middle = mix(mix(a, b, weight(random)), c, weight(random));
     core::array::from_fn(|_| {
         let origin = origin.map(|x| x + x * away * random.unit() as f32);
         let target = mix(mix(a, b, weight(random)), c, weight(random));
+        let target = mix(middle, target, apart);
         let direction = [0, 1, 2].map(|k| target[k] - origin[k]);
         let t = [1.0, 1f32.next_up(), 1f32.next_down(), f32::INFINITY][random.below(4)];
         Ray::new(origin, direction).with_limits(0.0, t)

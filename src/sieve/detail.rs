@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::areas::{Across, Along, area};
 use super::meetings::Middle;
 use super::triangle::{One, sheared};
 use super::vector::{cross, dot, sum_abs};
@@ -22,39 +23,70 @@ pub(crate) struct TriangleDetail {
     pub front: Option<bool>,
 }
 
-/// What the filter knows of a triangle that it does not reject.
+/// What `f32` knows of a triangle that the filter does not reject.
 pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
+    let Some(Plane { t, t_error, front }) = plane(ray, corners) else {
+        return edge_on(ray, corners);
+    };
+    let [a, b, c] = corners.map(|v| sheared(ray, v));
+    let [over_a, over_b, over_c] = over([&a.1, &b.1, &c.1]);
+    let total = over_a + over_b + over_c;
+    let [nearest, farthest] = extremes([a.0, b.0, c.0]);
+    let rate = ray.shear.depth_rate;
+    TriangleDetail {
+        t: (t * rate).max(nearest).min(farthest) / rate,
+        t_error,
+        weights: [over_b / total, over_c / total],
+        front: Some(front),
+    }
+}
+
+/// The same where the plane hardly tells where the ray meets it.
+#[cold]
+#[inline(never)]
+fn edge_on(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
     let middle = Middle::of_one(ray, &Aabb::around(&corners));
     let One { areas, meetings } = One::new(ray, &middle, corners);
     let [[over_a], [over_b], [over_c]] = areas.over;
     let ([area_error], [size_of_total], [rise]) = (areas.error, meetings.total, meetings.rise);
     let total = over_a + over_b + over_c;
-    let [a, b, c] = corners.map(|v| sheared(ray, v).0.depth[0]);
-    let (nearest, farthest) = (a.min(b).min(c), a.max(b).max(c));
+    let [nearest, farthest] = extremes(corners.map(|v| sheared(ray, v).0));
     // The total carries the errors of three areas, and less than as much again of its own.
     let is_clear = size_of_total > 6.0 * area_error;
     // A NaN, from 0 / 0, loses to the depths of the vertices.
     let depth = (middle.depth[0] + rise / size_of_total).max(nearest).min(farthest);
-    let rate = ray.shear.depth_rate;
-    let (t, t_error) = match plane(ray, corners) {
-        Some((t, t_error)) => ((t * rate).max(nearest).min(farthest) / rate, t_error),
-        None => (depth / rate, f32::INFINITY),
-    };
     TriangleDetail {
-        t,
-        t_error,
+        t: depth / ray.shear.depth_rate,
+        t_error: f32::INFINITY,
         weights: [over_b / total, over_c / total],
         front: is_clear.then_some((total < 0.0) == (ray.shear.depth_scale > 0.0)),
     }
 }
 
-/// The frame's `t` at which the ray meets the plane of the triangle, and a bound on its error; `None` when
-/// they are nearly parallel.
+/// The areas over each of three vertices.
+fn over([a, b, c]: [&Across<[f32; 1]>; 3]) -> [f32; 3] {
+    [area::<_, false, 1>(b, c)[0], area::<_, false, 1>(c, a)[0], area::<_, false, 1>(a, b)[0]]
+}
+
+/// The least and the largest depth of three vertices.
+fn extremes(along: [Along<[f32; 1]>; 3]) -> [f32; 2] {
+    let [a, b, c] = along.map(|v| v.depth[0]);
+    [a.min(b).min(c), a.max(b).max(c)]
+}
+
+/// Where the ray meets the plane of a triangle, in the frame, and a bound on the error of that.
+struct Plane {
+    t: f32,
+    t_error: f32,
+    front: bool,
+}
+
+/// The meeting with the plane; `None` when they are nearly parallel.
 ///
 /// Far tighter than what the areas give for a ray that starts on a large triangle: the error grows with the
 /// distance to the first vertex instead of with the triangle. The computation is that of
 /// [`interval`](crate::interval) with another unit, and its bounds.
-fn plane(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Option<(f32, f32)> {
+fn plane(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Option<Plane> {
     let [a, b, c] = corners.map(|vertex| Vec3::from(vertex) * ray.scale);
     let (e1, e2) = (b - a, c - a);
     let n = cross(e1, e2);
@@ -69,5 +101,6 @@ fn plane(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Option<(f32, f32)> {
     let t = dot(to_plane, n) / along;
     // Half as much again for the divisor's own error, and a few roundings of the quotient and limits.
     let error = (sum_abs(to_plane) * size + TINY + t.abs() * along_error) / along.abs();
-    Some((t, 1.5 * error + 8.0 * UNIT32 * t.abs()))
+    let t_error = 1.5 * error + 8.0 * UNIT32 * t.abs();
+    Some(Plane { t, t_error, front: along < 0.0 })
 }
