@@ -162,8 +162,8 @@ enum Source<'a> {
     Foreign(&'a dyn Geometries<'a>),
 }
 
-/// Geometries that are made when they are asked for.
-pub(crate) trait Geometries<'a> {
+/// Geometries that are made when they are asked for, on any thread of a build.
+pub(crate) trait Geometries<'a>: Sync {
     fn mesh_count(&self) -> usize;
     fn mesh(&self, i: usize) -> Option<Mesh<'a>>;
     fn sphere_set_count(&self) -> usize;

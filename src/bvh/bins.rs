@@ -15,33 +15,46 @@ pub(crate) struct Effort {
     samples: usize,
     /// Whether only the axis is looked at along which the centres are furthest apart.
     one_axis: bool,
+    /// Above this [`unevenness`] more is done.
+    even: f64,
 }
 
 impl Effort {
-    pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true };
-    pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false };
-    pub const BEST: Effort = Effort { bins: BINS, samples: ALL, one_axis: false };
+    pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true, even: f64::INFINITY };
+    pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false, even: 64.0 };
+    pub const BEST: Effort = Effort { bins: BINS, samples: ALL, one_axis: false, even: 4.0 };
 
-    /// The same for these refs, or the best where few are much larger than the others, such as the walls of a building: a
-    /// sample says nothing of them, and where they are parted matters.
-    pub fn for_refs(self, refs: &[PrimRef], areas: Areas) -> Effort {
-        let (mut sum, mut squares) = (0.0, 0.0);
-        for r in refs {
-            let area = f64::from(areas.of_finite(&r.bounds));
-            sum += area;
-            squares += area * area;
-        }
-        // 1 where all are alike, about `n / k` where `k` have most of the area.
-        let uneven = squares * refs.len() as f64 > UNEVEN * sum * sum;
-        if uneven && !self.one_axis { Self::BEST } else { self }
+    /// Whether few refs are much larger than the others, such as the walls of a building: a sample says
+    /// nothing of them, and where they are parted matters.
+    pub fn is_uneven(self, unevenness: f64) -> bool {
+        unevenness > self.even
+    }
+
+    /// The same, or the best for uneven scenes.
+    pub fn for_unevenness(self, unevenness: f64) -> Effort {
+        if self.is_uneven(unevenness) { Self::BEST } else { self }
+    }
+
+    /// Whether refs may be cut, and the grown tree is mended, where that makes rays faster.
+    pub fn is_best(self) -> bool {
+        self.samples == ALL
     }
 }
 
 /// As many samples as there are refs.
 const ALL: usize = 1 << 29;
 
-/// Above this the areas of refs are uneven.
-const UNEVEN: f64 = 64.0;
+/// How unlike the areas of refs are: 1 where all are alike, about `n / k` where `k` of `n` have most of the
+/// area.
+pub(crate) fn unevenness(refs: &[PrimRef], areas: Areas) -> f64 {
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for r in refs {
+        let area = f64::from(areas.of_finite(&r.bounds));
+        sum += area;
+        squares += area * area;
+    }
+    squares * refs.len() as f64 / (sum * sum)
+}
 
 /// How centres fall into bins.
 #[derive(Clone, Copy)]

@@ -2,8 +2,10 @@
 
 use super::How;
 use super::MAX_DEPTH;
+use super::bins::unevenness;
 use super::branch::grow;
 use super::refs::{PrimRef, gather};
+use super::split::Areas;
 use super::tree::{Grown, Limits, leaf_budget};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
@@ -96,9 +98,10 @@ fn grow_tree(
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
     gather(scene, census, refs);
     let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-    let limits =
-        Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false, effort: how.effort };
-    let node_count = grow(nodes, refs, &limits, how.caller)?;
+    let effort = how.effort.for_unevenness(unevenness(refs, Areas::new(&census.bounds)));
+    let leaves = plan.leaves;
+    let limits = Limits { leaves, source: None, leaf_max: LEAF_MAX, mixed, deep: false, effort };
+    let node_count = grow(nodes, refs, plan.ref_count, &limits, how.caller)?.nodes;
     // Triangles first, then spheres, each in the order of the leaves.
     let kinds = [false, true];
     let kinds =

@@ -3,11 +3,15 @@
 
 mod bins;
 mod branch;
+mod clip;
 mod collapse;
 mod compact;
 mod emit;
 mod fits;
+mod order;
 mod refs;
+mod reinsert;
+mod spatial;
 mod split;
 mod stack;
 mod sweep;

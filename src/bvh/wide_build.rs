@@ -1,16 +1,19 @@
 //! The wide layouts: from a scene to bundles in the caller's memory.
 
 use super::How;
-use super::branch::grow;
+use super::bins::unevenness;
+use super::branch::{Size, grow};
 use super::collapse::choose;
 use super::compact;
 use super::emit::{BEGINS, Chosen, Sizes};
 use super::refs::{PrimRef, gather};
+use super::reinsert::mend;
+use super::spatial::Source;
 use super::split::Areas;
 use super::tree::{Limits, leaf_budget};
 use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
-use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
+use crate::block::{BvhNode, Census, Counts, Geometry, KIND_BVH, PartsMut};
 use crate::error::BuildError;
 use crate::prim::{Packer, Shapes, Survey, geometries};
 use crate::scene::Scene;
@@ -19,36 +22,60 @@ use crate::storage::{self, ALIGNMENT, Plain};
 /// Primitives of a leaf of the binary tree at most: any five triangles fit into a block.
 const LEAF_MAX: usize = TRIANGLES_AT_LEAST;
 
-/// Where the scratch lies while the tree grows: behind all that is finished, at the end of the
-/// memory.
+/// Where the scratch lies: behind all that is finished.
 ///
 /// ```text
-/// | header | geometries | ...      | refs                | nodes |    growing
-/// | header | geometries | ...      | choices | ids       | nodes |    choosing
+/// | header | geometries | refs             ...          | nodes |    growing
+/// | header | geometries | scratch   ...           | ids | nodes |    mending
+/// | header | geometries | ...         | choices | ids   | nodes |    choosing
 /// | header | geometries | prim_ids | bundles | choices | ids | nodes | emitting
 /// | header | geometries | prim_ids | bundles | spheres | triangles | packing
 /// ```
 struct Places {
     refs: usize,
     nodes: usize,
+    /// Refs at most: more than primitives, where some may be cut in two.
+    room: usize,
     /// Leaves of the binary tree at most.
     leaves: usize,
 }
 
 impl Places {
-    /// The places in memory of `size` bytes; `None` when they do not fit.
+    /// The places in memory of `size` bytes for what a scene without large primitives wants; `None` when
+    /// they do not fit.
     fn new(survey: &Survey, census: &Census, size: usize) -> Option<Places> {
         let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-        let prims = census.hittable() as usize;
+        let room = census.hittable() as usize;
         // More leaves, a half of the primitives or all, made no ray faster: the collapse puts them
         // together again.
-        let leaves = leaf_budget(prims, mixed, false);
-        let nodes = (size / ALIGNMENT * ALIGNMENT)
-            .checked_sub(leaves.checked_mul(2 * size_of::<BvhNode>())?)?;
-        let refs = nodes.checked_sub(prims.checked_mul(size_of::<PrimRef>())?)?;
-        (refs >= front(survey)?).then_some(Places { refs, nodes, leaves })
+        let leaves = leaf_budget(room, mixed, false);
+        let places = Places { refs: front(survey)?, nodes: 0, room, leaves };
+        places.fitting(room, leaves, size)
+    }
+
+    /// The same with other numbers of refs and leaves, if they fit.
+    fn fitting(&self, room: usize, leaves: usize, size: usize) -> Option<Places> {
+        let nodes = (size / ALIGNMENT * ALIGNMENT).checked_sub(leaves.checked_mul(PAIR)?)?;
+        let refs = self.refs;
+        let end = refs.checked_add(room.checked_mul(size_of::<PrimRef>())?)?;
+        (end <= nodes).then_some(Places { refs, nodes, room, leaves })
+    }
+
+    /// What an uneven scene wants, as far as `size` bytes reach: a leaf for every other ref, as a wall
+    /// shall not be in one with a chair; and, if refs may be cut, a quarter more of them, which takes half
+    /// of what is free at most.
+    fn for_uneven(self, cut: bool, size: usize) -> Places {
+        const REF: usize = size_of::<PrimRef>();
+        let free = self.nodes - self.refs - self.room * REF;
+        let more = if cut { (self.room / 4).min(free / (2 * REF)) } else { 0 };
+        let most = self.leaves + (free - more * REF) / PAIR;
+        let (room, leaves) = (self.room + more, ((self.room + more) / 2).clamp(self.leaves, most));
+        self.fitting(room, leaves, size).unwrap_or(self)
     }
 }
+
+/// What the nodes of one more leaf take.
+const PAIR: usize = 2 * size_of::<BvhNode>();
 
 /// The end of header and geometries.
 fn front(survey: &Survey) -> Option<usize> {
@@ -72,15 +99,16 @@ pub(crate) fn needs_wide(
     let lanes = 3 * u64::from(triangle_blocks + sphere_blocks) / 2;
     let bundles = 2 + lanes / u64::from(width);
     let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks };
-    let finished = counts(survey, census, &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
+    let finished =
+        counts(survey, census.hittable(), &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
     Ok((compact.max(finished.end), minimum))
 }
 
 /// The parts of the finished block.
-fn counts(survey: &Survey, census: &Census, sizes: &Sizes, width: u32) -> Counts {
+fn counts(survey: &Survey, prim_ids: u32, sizes: &Sizes, width: u32) -> Counts {
     Counts {
         geometries: survey.geometry_count,
-        prim_ids: census.hittable(),
+        prim_ids,
         bundle_lanes: sizes.bundles.saturating_mul(width),
         sphere_blocks: sizes.sphere_blocks,
         triangle_blocks: sizes.triangle_blocks,
@@ -128,16 +156,15 @@ where
 {
     let places = Places::new(survey, census, bytes.len())?;
     how.caller.done(0.1)?;
-    let nodes = grow_tree(scene, survey, census, &places, how, bytes)?;
+    let scratch = grow_tree(scene, survey, census, places, how, bytes)?;
     how.caller.done(0.6)?;
-    let scratch = Scratch::new(census, &places, nodes)?;
-    let prims = census.hittable();
+    let prims = scratch.prims as u32;
     let areas = Areas::new(&census.bounds);
     let whole = areas.of(&census.bounds);
     let mean = whole / prims as f32;
     for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
         let sizes = scratch.choose::<W>(scene, survey, areas, price, bytes)?;
-        let counts = counts(survey, census, &sizes, W as u32);
+        let counts = counts(survey, prims, &sizes, W as u32);
         let at = counts.offsets()?;
         if at.words <= scratch.choices && at.end <= bytes.len() {
             how.caller.done(0.85)?;
@@ -149,32 +176,58 @@ where
     None
 }
 
-/// Grows the binary tree, and moves the ids behind the refs' place; returns the number of nodes.
+/// Grows the binary tree, and moves the ids to the end of the refs' place.
 fn grow_tree(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
-    places: &Places,
+    places: Places,
     how: &How,
     bytes: &mut [u8],
-) -> Option<usize> {
-    let front = Counts { geometries: survey.geometry_count, ..Counts::default() };
-    geometries(scene, front.parts_mut(bytes)?.geometries);
-    let prims = census.hittable() as usize;
+) -> Option<Scratch> {
+    let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
+    geometries(scene, table.parts_mut(bytes)?.geometries);
+    let areas = Areas::new(&census.bounds);
+    let count = census.hittable() as usize;
+    let refs = storage::view_mut::<PrimRef>(bytes, places.refs, count)?;
+    gather(scene, census, refs);
+    let unevenness = unevenness(refs, areas);
+    let uneven = how.effort.is_uneven(unevenness);
+    let best = uneven && how.effort.is_best();
+    // Spheres are not cut.
+    let cut = best && census.sphere_count == 0;
+    let places = if uneven { places.for_uneven(cut, bytes.len()) } else { places };
     let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
-    let refs = storage::view_mut::<PrimRef>(front, places.refs, prims)?;
-    gather(scene, census, refs);
-    let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-    let limits =
-        Limits { leaves: places.leaves, leaf_max: LEAF_MAX, mixed, deep: true, effort: how.effort };
-    let count = grow(nodes, refs, &limits, how.caller)?;
-    // From the last on, each id goes to the end of the refs' place, onto refs that are done.
-    let words = storage::view_mut::<u32>(front, places.refs, 8 * prims)?;
-    for i in (0..prims).rev() {
-        words[7 * prims + i] = PrimRef::id_of(words[8 * i + PrimRef::ID]);
+    let (front, refs) = front.split_at_mut_checked(places.refs)?;
+    let slots = storage::view_mut::<PrimRef>(refs, 0, places.room)?;
+    let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
+    let limits = Limits {
+        leaves: places.leaves,
+        source: cut.then_some(Source { scene, geometries }),
+        leaf_max: LEAF_MAX,
+        mixed: census.triangle_count > 0 && census.sphere_count > 0,
+        deep: true,
+        effort: how.effort.for_unevenness(unevenness),
+    };
+    let size = grow(nodes, slots, count, &limits, how.caller)?;
+    let (free, ids) = ids_to_end(refs, size.refs)?;
+    if best {
+        mend(nodes.get_mut(..size.nodes)?, ids, areas, free)?;
     }
-    Some(count)
+    Scratch::new(&places, size)
+}
+
+/// Moves the ids of so many refs to the end of their place; returns what is free before them, and them.
+fn ids_to_end(place: &mut [u8], count: usize) -> Option<(&mut [u8], &mut [u32])> {
+    let words = storage::view_mut::<u32>(place, 0, place.len() / size_of::<u32>())?;
+    let first = words.len().checked_sub(count)?;
+    // From the last on, each goes onto refs that are done.
+    for i in (0..count).rev() {
+        words[first + i] = PrimRef::id_of(words[8 * i + PrimRef::ID]);
+    }
+    let (free, ids) = place.split_at_mut_checked(size_of::<u32>() * first)?;
+    Some((free, storage::view_mut(ids, 0, count)?))
 }
 
 /// The tree, its choices and the ids, at the end of the memory.
@@ -188,12 +241,12 @@ struct Scratch {
 }
 
 impl Scratch {
-    fn new(census: &Census, places: &Places, node_count: usize) -> Option<Scratch> {
-        let prims = census.hittable() as usize;
-        let pairs = node_count / 2 - 1;
-        let ids = places.nodes - 4 * prims;
+    fn new(places: &Places, size: Size) -> Option<Scratch> {
+        let pairs = size.nodes / 2 - 1;
+        let ids = places.nodes - 4 * size.refs;
         let choices = (ids / 8 * 8).checked_sub(8 * pairs)?;
-        Some(Scratch { choices, pairs, ids, prims, nodes: places.nodes, node_count })
+        let (prims, nodes, node_count) = (size.refs, places.nodes, size.nodes);
+        Some(Scratch { choices, pairs, ids, prims, nodes, node_count })
     }
 
     fn choose<const W: usize>(
@@ -228,7 +281,7 @@ impl Scratch {
         let PartsMut { prim_ids, bundles, .. } = front_counts.parts_mut(front)?;
         let count = bundles.len() / (W * LANE);
         let bundles = storage::view_mut::<Bundle<W>>(bundles, 0, count)?;
-        chosen.emit(bundles, prim_ids, census.triangle_count as usize)
+        chosen.emit(bundles, prim_ids, self.prims - census.sphere_count as usize)
     }
 }
 
@@ -236,7 +289,9 @@ impl Scratch {
 fn pack(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Option<()> {
     let PartsMut { geometries, prim_ids, sphere_blocks, triangle_blocks, .. } =
         counts.parts_mut(bytes)?;
-    let mut packer = Packer::new(triangle_blocks, sphere_blocks, census.triangle_count);
+    // Spheres are not cut, so each has one id.
+    let first_sphere = counts.prim_ids - census.sphere_count;
+    let mut packer = Packer::new(triangle_blocks, sphere_blocks, first_sphere);
     let mut shapes = Shapes::new(scene, geometries);
     for id in prim_ids {
         if *id & BEGINS != 0 {

@@ -99,6 +99,10 @@ struct Elements<'a, T> {
     memory: PhantomData<&'a [T]>,
 }
 
+// SAFETY: elements are read and never written during `'a`, as `new` was promised, and pointers in them
+// are read as numbers.
+unsafe impl<T> Sync for Elements<'_, T> {}
+
 impl<'a, T: Growing> Elements<'a, T> {
     /// # Safety
     ///
