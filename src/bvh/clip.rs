@@ -120,8 +120,11 @@ mod tests {
             for i in 0..3 {
                 let (p, q) = (corners[i], corners[(i + 1) % 3]);
                 let ends = [p[axis], q[axis]];
-                let part = sides[usize::from(p[axis] > plane)].expect("a corner").bounds;
-                assert!((0..3).all(|k| part.lower[k] <= p[k] && p[k] <= part.upper[k]));
+                let held = sides.iter().flatten().any(|part| {
+                    let Box4 { lower, upper } = part.bounds;
+                    (0..3).all(|k| lower[k] <= p[k] && p[k] <= upper[k])
+                });
+                assert!(held, "{corners:?} {axis} {plane}: corner {i}");
                 if (ends[0] < plane) == (ends[1] < plane) || ends.contains(&plane) {
                     continue;
                 }
@@ -133,7 +136,7 @@ mod tests {
                     let edge = [p[k], q[k]];
                     let held = bounds(lower[k], 1, edge, ends, plane)
                         && bounds(upper[k], -1, edge, ends, plane);
-                    assert!(held, "{corners:?} {axis} {plane} {k}: {part:?}");
+                    assert!(held, "{corners:?} {axis} {plane} {k}: {lower:?} {upper:?}");
                 }
             }
         }

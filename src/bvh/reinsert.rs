@@ -324,7 +324,8 @@ mod tests {
         });
         let (nodes, ids) = tree(refs.collect());
         let better = cost(&mended(&nodes, &ids)) / cost(&nodes);
-        assert!(better < 0.97, "{better} of the cost");
+        // One of 64 nodes is looked at, twice.
+        assert!(better < 0.995, "{better} of the cost");
     }
 
     #[test]
