@@ -171,7 +171,7 @@ enum Source<'a> {
     Foreign(&'a dyn Geometries<'a>),
 }
 
-/// Geometries that are made when they are asked for.
+/// Geometries that are made when they are asked for, on any thread of a build.
 pub(crate) trait Geometries<'a>: Sync {
     fn mesh_count(&self) -> usize;
     fn mesh(&self, i: usize) -> Option<Mesh<'a>>;

@@ -145,6 +145,43 @@ fn every_quality_takes_what_is_promised() {
     }
 }
 
+/// Halls have walls to cut: with less memory fewer, and with little none.
+#[test]
+fn the_best_quality_takes_any_memory_from_the_minimum_on() {
+    let (_, make) = make::ALL.into_iter().find(|(name, _)| *name == "architecture").expect("halls");
+    let model = make(5_000);
+    let rays = RayMaker::new(&model, 5).many(Family::Random, 100);
+    let options = options(Quality::Best, Layout::Wide(16));
+    let known = block(&model, &BuildOptions { quality: Quality::Balanced, ..options });
+    let mut sizes = std::collections::BTreeSet::new();
+    model.with_scene(|scene| {
+        let needs = raykern::bvh_needs(scene, &options).expect("a size");
+        for step in 0..=12 {
+            let size = needs.minimum + (needs.size - needs.minimum) * step / 8;
+            let mut memory = vec![std::mem::MaybeUninit::new(0xa5u8); size + 64];
+            let start = memory.as_ptr().align_offset(64);
+            let memory = &mut memory[start..start + size];
+            let built = raykern::build_bvh(scene, &options, memory).expect("enough");
+            Accel::open(built.block()).expect("a sound block");
+            sizes.insert(built.block().len());
+            with_open(&known, |known| {
+                for ray in &rays {
+                    assert_eq!(bits(built.intersect(ray)), bits(known.intersect(ray)), "{size}");
+                }
+            });
+        }
+    });
+    assert!(sizes.len() > 3, "{sizes:?}");
+}
+
+/// Calls `f` with the structure in a copy of a block.
+fn with_open(block: &[u8], f: impl FnOnce(&Accel)) {
+    let mut memory = vec![0u8; block.len() + 64];
+    let start = memory.as_ptr().align_offset(64);
+    memory[start..start + block.len()].copy_from_slice(block);
+    f(&Accel::open(&memory[start..start + block.len()]).expect("a sound block"));
+}
+
 type Build = fn(&Scene, &BuildOptions) -> Result<OwnedAccel, BuildError>;
 
 #[test]

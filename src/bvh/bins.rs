@@ -17,17 +17,25 @@ pub(crate) struct Effort {
     one_axis: bool,
     /// Triangles at most that go as one, each with an edge of the one before.
     pub strip: usize,
+    /// Above this unevenness of the refs more is done.
+    even: f64,
+    /// Whether that is to cut refs in two, and to mend the grown tree.
+    pub mends: bool,
 }
 
 impl Effort {
-    pub const FAST: Effort = Effort { bins: 16, samples: 64, one_axis: true, strip: 4 };
-    pub const BALANCED: Effort = Effort { bins: 16, samples: 512, one_axis: false, strip: 2 };
-    pub const BEST: Effort = Effort { bins: BINS, samples: ALL, one_axis: false, strip: 1 };
+    pub const FAST: Effort =
+        Effort { bins: 16, samples: 64, one_axis: true, strip: 4, even: 64.0, mends: false };
+    pub const BALANCED: Effort =
+        Effort { bins: 16, samples: 512, one_axis: false, strip: 2, even: 64.0, mends: false };
+    pub const BEST: Effort =
+        Effort { bins: BINS, samples: ALL, one_axis: false, strip: 1, even: 4.0, mends: true };
 
-    /// The effort where few refs are much larger than the others: a sample says nothing of them, and where they are
-    /// parted matters.
-    pub fn for_uneven(self) -> Effort {
-        Effort { samples: ALL, one_axis: false, ..self }
+    /// The effort where few refs are much larger than the others, such as the walls of a building: a sample says nothing
+    /// of them, and where they are parted matters. `None` for scenes that are even enough.
+    pub fn for_uneven(self, unevenness: f64) -> Option<Effort> {
+        let uneven = Effort { samples: ALL, one_axis: false, ..self };
+        (unevenness > self.even).then_some(uneven)
     }
 }
 

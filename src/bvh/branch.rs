@@ -1,7 +1,6 @@
 //! The tree as branches that grow independently, on any number of threads.
 
 use super::MAX_DEPTH;
-use super::bins::Bins;
 use super::refs::PrimRef;
 use super::split::{Areas, Extent};
 use super::tree::{Grown, Limits, Splitter, Task};
@@ -10,8 +9,19 @@ use crate::caller::{Caller, PARTS};
 use crate::math::Aabb;
 use crate::prim::GRAIN;
 
-/// Builds the tree over `refs`, of which there is at least one, and brings them into the order of
-/// the leaves. Returns the number of nodes.
+/// How much a tree has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Size {
+    pub nodes: usize,
+    /// Refs of all leaves.
+    pub refs: usize,
+    /// Primitives of all leaves; what is cut in two counts twice.
+    pub prims: usize,
+}
+
+/// Builds the tree over the first `count` of `slots`, of which there is at least one, and brings them
+/// into the order of the leaves. If there are more slots and `limits` says where shapes are, refs may be
+/// cut in two.
 ///
 /// Nodes are laid out as [`tree_is_sound`](super::tree_is_sound) expects them; leaves are
 /// [`Grown`] until they are packed. `nodes` has two entries for each leaf of `budget`.
@@ -23,30 +33,24 @@ use crate::prim::GRAIN;
 /// Source: \[Wald07\], with leaves limited in number as the memory is.
 pub(crate) fn grow(
     nodes: &mut [BvhNode],
-    refs: &mut [PrimRef],
+    slots: &mut [PrimRef],
+    count: usize,
     limits: &Limits,
     caller: &Caller,
-) -> Option<usize> {
-    let extent = whole(refs, caller);
-    let areas = Areas::new(&extent.bounds.aabb());
-    let uneven = are_uneven(refs, areas, caller);
-    let effort = if uneven { limits.effort.for_uneven() } else { limits.effort };
-    let splitter = Splitter { limits: &Limits { effort, ..*limits }, areas };
-    let root = Task {
-        node: 0,
-        pairs: 2,
-        first: 0,
-        count: refs.len(),
-        depth: 0,
-        budget: limits.leaves,
-        extent,
-    };
+) -> Option<Size> {
+    let extent = whole(slots.get(..count)?, caller);
+    let bounds = extent.bounds.aabb();
+    let areas = Areas::new(&bounds);
+    let splitter = Splitter { limits, areas, whole: areas.of(&bounds) };
+    let room = if limits.source.is_some() { slots.len() } else { count };
+    let budget = limits.leaves;
+    let root = Task { node: 0, pairs: 2, first: 0, count, room, depth: 0, budget, extent };
     let mut tasks = [root; BRANCHES];
-    let count = splitter.branch_out(nodes, refs, &mut tasks, caller)?;
+    let count = splitter.branch_out(nodes, slots, &mut tasks, caller)?;
     let tasks = &tasks[..count];
     let mut branches: [Option<Branch>; BRANCHES] = [const { None }; BRANCHES];
     let (mut free_nodes, mut at_node) = (&mut *nodes, 0);
-    for ((task, refs), branch) in tasks.iter().zip(ranges(tasks, refs)).zip(&mut branches) {
+    for ((task, refs), branch) in tasks.iter().zip(places(tasks, slots)).zip(&mut branches) {
         let (first, room) = (task.pairs as usize, 2 * (task.budget - 1));
         let rest = core::mem::take(&mut free_nodes).split_at_mut_checked(first - at_node)?.1;
         let (nodes, rest) = rest.split_at_mut_checked(room)?;
@@ -65,7 +69,7 @@ pub(crate) fn grow(
     for (task, root) in tasks.iter().zip(roots) {
         *nodes.get_mut(task.node as usize)? = root;
     }
-    close_gaps(nodes)
+    close_gaps(nodes, slots)
 }
 
 /// Branches at most. How many there are must not depend on the threads, as the tree must not.
@@ -73,7 +77,7 @@ const BRANCHES: usize = 64;
 /// Branches of fewer refs are not parted further.
 const BRANCH: usize = 2048;
 
-/// A subtree of its own, with its place.
+/// A subtree of its own, with its places.
 pub(super) struct Branch<'b> {
     pub task: Task,
     pub nodes: &'b mut [BvhNode],
@@ -82,36 +86,36 @@ pub(super) struct Branch<'b> {
     root: Option<BvhNode>,
 }
 
-impl Splitter<'_> {
+impl Splitter<'_, '_, '_> {
     /// Splits the tasks that are large, at the same time, until there are enough or all are small; returns their
     /// number. They stay in the order of the tree.
     fn branch_out(
         self,
         nodes: &mut [BvhNode],
-        refs: &mut [PrimRef],
+        slots: &mut [PrimRef],
         tasks: &mut [Task; BRANCHES],
         caller: &Caller,
     ) -> Option<usize> {
-        let grain = (refs.len() / 48).max(BRANCH);
+        let grain = (tasks[0].count / 48).max(BRANCH);
         let mut count = 1;
         while let Some(large) = self.large(&tasks[..count], grain) {
             let mut jobs = [const { None }; BRANCHES];
-            for ((task, refs), job) in
-                tasks.iter().zip(ranges(&tasks[..count], refs)).zip(&mut jobs)
+            for ((task, slots), job) in
+                tasks.iter().zip(places(&tasks[..count], slots)).zip(&mut jobs)
             {
-                *job = (task.count > large).then_some((*task, refs, None));
+                *job = (task.count > large).then_some((*task, slots, None));
             }
             caller.for_each(&mut jobs[..count], |job| {
-                if let Some((task, refs, split)) = job {
-                    let mut bins = Bins::EMPTY;
-                    *split = self.part(refs, task, &mut bins);
+                if let Some((task, slots, children)) = job {
+                    let split = self.part(slots, task, &mut self.scratch());
+                    *children = split.and_then(|split| task.children(&split, task.pairs, slots));
                 }
             });
             let olds = *tasks;
             let olds_and_jobs = olds.iter().zip(&jobs).take(count);
             count = 0;
             for (task, job) in olds_and_jobs {
-                let Some((_, _, split)) = job else {
+                let Some((_, _, children)) = job else {
                     tasks[count] = *task;
                     count += 1;
                     continue;
@@ -119,8 +123,7 @@ impl Splitter<'_> {
                 // More than a leaf, so it is split.
                 let node = nodes.get_mut(task.node as usize)?;
                 *node = BvhNode::inner(&task.extent.bounds.aabb(), task.pairs);
-                tasks[count..count + 2]
-                    .copy_from_slice(&task.children(split.as_ref()?, task.pairs));
+                tasks[count..count + 2].copy_from_slice(children.as_ref()?);
                 count += 2;
             }
         }
@@ -139,14 +142,14 @@ impl Splitter<'_> {
     }
 }
 
-/// The refs of each task: they follow each other.
-fn ranges<'r>(tasks: &[Task], refs: &'r mut [PrimRef]) -> impl Iterator<Item = &'r mut [PrimRef]> {
-    let mut free = refs;
+/// The slots of each task: they follow each other.
+fn places<'r>(tasks: &[Task], slots: &'r mut [PrimRef]) -> impl Iterator<Item = &'r mut [PrimRef]> {
+    let mut free = slots;
     tasks.iter().map(move |task| {
-        let count = task.count.min(free.len());
-        let (refs, rest) = core::mem::take(&mut free).split_at_mut(count);
+        let room = task.room.min(free.len());
+        let (slots, rest) = core::mem::take(&mut free).split_at_mut(room);
         free = rest;
-        refs
+        slots
     })
 }
 
@@ -160,8 +163,8 @@ fn whole(refs: &[PrimRef], caller: &Caller) -> Extent {
     extent
 }
 
-/// Whether few refs are much larger than the others, such as the walls of a building.
-fn are_uneven(refs: &[PrimRef], areas: Areas, caller: &Caller) -> bool {
+/// How unlike the areas of refs are: 1 where all are alike, about `n / k` where `k` of `n` have most of the area.
+pub(super) fn unevenness(refs: &[PrimRef], areas: Areas, caller: &Caller) -> f64 {
     let parts = caller.map_parts(refs.len(), part_size(refs), |part| {
         let (mut sum, mut squares) = (0.0, 0.0);
         for r in &refs[part] {
@@ -172,41 +175,44 @@ fn are_uneven(refs: &[PrimRef], areas: Areas, caller: &Caller) -> bool {
         (sum, squares)
     });
     let (sum, squares) = parts.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
-    // 1 where all are alike, about `n / k` where `k` have most of the area.
-    squares * refs.len() as f64 > UNEVEN * sum * sum
+    squares * refs.len() as f64 / (sum * sum)
 }
-
-/// Above this the areas of refs are uneven.
-const UNEVEN: f64 = 64.0;
 
 /// Parts that do not depend on the threads, as sums are rounded.
 fn part_size(refs: &[PrimRef]) -> usize {
     refs.len().div_ceil(PARTS).max(GRAIN)
 }
 
-/// Moves pairs of children down to where the one before ends; returns the number of nodes.
-fn close_gaps(nodes: &mut [BvhNode]) -> Option<usize> {
+/// Moves pairs of children, and the refs of leaves, down to where the ones before end.
+fn close_gaps(nodes: &mut [BvhNode], slots: &mut [PrimRef]) -> Option<Size> {
     let mut stack = [0u32; MAX_DEPTH];
-    let (mut pending, mut used, mut at, mut prims) = (0, 2, 0u32, 0);
+    let mut size = Size { nodes: 2, refs: 0, prims: 0 };
+    let (mut pending, mut at) = (0, 0u32);
     loop {
         let node = nodes.get_mut(at as usize)?;
         if node.is_leaf() {
-            node.first = prims;
-            prims += Grown::of(node).0 as u32;
+            let (first, count) = (node.first as usize, Grown::ref_count(node));
+            if first != size.refs {
+                slots.get(first..first + count)?;
+                slots.copy_within(first..first + count, size.refs);
+            }
+            node.first = size.prims as u32;
+            size.refs += count;
+            size.prims += Grown::of(node).0;
             if pending == 0 {
-                return Some(used as usize);
+                return Some(size);
             }
             pending -= 1;
             at = stack[pending];
             continue;
         }
-        let pair = node.first as usize;
-        node.first = used;
+        let (pair, place) = (node.first as usize, size.nodes);
+        node.first = place as u32;
         // Pairs lie in the order of this walk, so the place is this pair's own, or one moved before.
-        nodes.copy_within(pair..pair + 2, used as usize);
-        *stack.get_mut(pending)? = used + 1;
+        nodes.copy_within(pair..pair + 2, place);
+        at = place as u32;
+        *stack.get_mut(pending)? = at + 1;
         pending += 1;
-        at = used;
-        used += 2;
+        size.nodes += 2;
     }
 }

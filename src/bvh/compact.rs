@@ -2,9 +2,11 @@
 
 use super::How;
 use super::MAX_DEPTH;
-use super::branch::grow;
+use super::branch::{grow, unevenness};
+use super::budget::leaf_budget;
 use super::refs::{PrimRef, gather};
-use super::tree::{Grown, Limits, leaf_budget};
+use super::split::Areas;
+use super::tree::{Grown, Limits};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
@@ -33,7 +35,7 @@ impl Plan {
     fn new(survey: &Survey, census: &Census, full: bool) -> Result<Plan, BuildError> {
         let (triangles, spheres) = (census.triangle_count, census.sphere_count);
         let prims = census.hittable();
-        let mixed = triangles > 0 && spheres > 0;
+        let mixed = census.is_mixed();
         let leaves = leaf_budget(prims as usize, mixed, LEAF_MAX, full);
         let growing = Counts {
             geometries: survey.geometry_count,
@@ -95,10 +97,12 @@ fn grow_tree(
     geometries(scene, table);
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
     gather(scene, census, 1, how.caller, refs);
-    let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-    let limits =
-        Limits { leaves: plan.leaves, leaf_max: LEAF_MAX, mixed, deep: false, effort: how.effort };
-    let node_count = grow(nodes, refs, &limits, how.caller)?;
+    let mixed = census.is_mixed();
+    let unevenness = unevenness(refs, Areas::new(&census.bounds), how.caller);
+    let effort = how.effort.for_uneven(unevenness).unwrap_or(how.effort);
+    let leaves = plan.leaves;
+    let limits = Limits { leaves, source: None, leaf_max: LEAF_MAX, mixed, deep: false, effort };
+    let node_count = grow(nodes, refs, plan.ref_count, &limits, how.caller)?.nodes;
     // Triangles first, then spheres, each in the order of the leaves.
     let kinds = [false, true];
     let kinds =

@@ -219,13 +219,15 @@ mod tests {
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * LEAVES];
         let limits = Limits {
             leaves: LEAVES,
+            source: None,
             leaf_max: 1,
             mixed: false,
             deep: true,
             effort: Effort::BALANCED,
         };
         let caller = &Caller::new(None, None);
-        assert_eq!(grow(&mut nodes, &mut refs, &limits, caller), Some(2 * LEAVES));
+        let size = grow(&mut nodes, &mut refs, LEAVES, &limits, caller);
+        assert_eq!(size.map(|size| size.nodes), Some(2 * LEAVES));
         for node in nodes.iter_mut().filter(|node| node.is_leaf()) {
             node.lanes = spheres | 1 << 8;
         }

@@ -3,13 +3,18 @@
 
 mod bins;
 mod branch;
+mod budget;
 mod choose;
+mod clip;
 mod collapse;
 mod compact;
 mod emit;
 mod fill;
 mod fits;
+mod order;
 mod refs;
+mod reinsert;
+mod spatial;
 mod split;
 mod stack;
 mod sweep;

@@ -3,35 +3,50 @@
 use super::MAX_DEPTH;
 use super::bins::{Bins, Effort, best_plane};
 use super::branch::Branch;
+use super::budget::{fewest_leaves, levels_to_halve};
 use super::refs::PrimRef;
+use super::spatial::{Source, best_cut, overlap};
 use super::split::{Areas, Extent};
 use super::sweep::{FEW, sweep};
 use crate::block::BvhNode;
 use crate::math::Aabb;
+use crate::prim::Shapes;
 
-/// A leaf that has no lanes yet: `lanes` holds the number of its primitives, and their kind in bit 8; `first` is, in
-/// the end, the number of primitives in the leaves before.
+/// A leaf that has no lanes yet. `first` is its first ref and, in the end, the number of primitives in the leaves
+/// before; `lanes` holds what it has:
+///
+/// ```text
+/// bit 0          8         9
+///     | primitives | spheres | refs |
+/// ```
 pub(crate) struct Grown;
 
 impl Grown {
-    fn leaf(bounds: &Aabb, refs: &[PrimRef]) -> BvhNode {
+    fn leaf(bounds: &Aabb, first: usize, refs: &[PrimRef]) -> BvhNode {
         let sphere = u32::from(refs.first().is_some_and(PrimRef::is_sphere));
         let count: usize = refs.iter().map(PrimRef::count).sum();
-        BvhNode { lanes: count as u32 | sphere << 8, ..BvhNode::inner(bounds, 0) }
+        let lanes = count as u32 | sphere << 8 | (refs.len() as u32) << 9;
+        BvhNode { lanes, ..BvhNode::inner(bounds, first as u32) }
     }
 
     /// The number of primitives, and whether they are spheres.
     pub fn of(node: &BvhNode) -> (usize, bool) {
-        ((node.lanes & 0xFF) as usize, node.lanes >> 8 != 0)
+        ((node.lanes & 0xFF) as usize, node.lanes >> 8 & 1 != 0)
+    }
+
+    pub fn ref_count(node: &BvhNode) -> usize {
+        (node.lanes >> 9) as usize
     }
 }
 
 /// What a tree may be.
 #[derive(Clone, Copy)]
-pub(crate) struct Limits {
-    /// Leaves at most.
+pub(crate) struct Limits<'s, 'a> {
+    /// Leaves at most; at least those of [`leaf_budget`](super::budget::leaf_budget) for what works.
     pub leaves: usize,
-    /// Refs of a leaf at most; 4 to 6.
+    /// Where shapes are looked up to cut them in two, if they may be.
+    pub source: Option<Source<'s, 'a>>,
+    /// Refs of a leaf at most; 2 to 6.
     pub leaf_max: usize,
     /// Whether there are triangles and spheres: a leaf is of one kind.
     pub mixed: bool,
@@ -44,6 +59,15 @@ pub(crate) struct Limits {
 /// Cost of a step to two children, in tests of one primitive.
 const STEP_COST: f32 = 2.0;
 
+/// Where boxes of two sides overlap by less than this part of the scene's area, nothing is cut.
+const OVERLAP: f32 = 5e-3;
+/// The same for a part of the node's own area.
+const OVERLAP_OF_NODE: f32 = 0.1;
+/// Cutting must save this part of the work.
+const SAVED: f32 = 0.02;
+/// Of fewer refs none are cut.
+const CUT_FROM: usize = 32;
+
 /// A subtree to build: the refs `first .. first + count` under node `node`.
 #[derive(Clone, Copy)]
 pub(super) struct Task {
@@ -52,6 +76,8 @@ pub(super) struct Task {
     pub pairs: u32,
     pub first: usize,
     pub count: usize,
+    /// Slots for its refs, from `first` on: more than there are, where refs may be cut.
+    pub room: usize,
     pub depth: usize,
     /// Leaves it may have.
     pub budget: usize,
@@ -60,53 +86,37 @@ pub(super) struct Task {
 
 /// Where a node's refs are parted, the fewest leaves that either side needs, and their boxes.
 pub(super) struct Split {
-    left_count: usize,
+    counts: [usize; 2],
     least: [usize; 2],
     sides: [Extent; 2],
 }
 
-/// The fewest leaves that `count` refs can always be brought into by halving, and by parting
-/// kinds at the end when both occur.
-///
-/// By induction: what is at most a leaf is one leaf, or two of different kinds; what is more, `leaf_max + 1` at
-/// least, has halves of at least `half`, the lesser half of that, and `count / half` is superadditive.
-fn fewest_leaves(count: usize, mixed: bool, leaf_max: usize) -> usize {
-    let half = leaf_max.div_ceil(2);
-    match (count, mixed) {
-        (0 | 1, _) => count,
-        (_, false) => (count / half).max(1),
-        (_, true) => (2 * count / half).max(2),
-    }
-}
-
-/// The leaves that a tree over `count` refs may have: `full` is what good trees want, the
-/// other bound the least that works.
-pub(crate) fn leaf_budget(count: usize, mixed: bool, leaf_max: usize, full: bool) -> usize {
-    let least = fewest_leaves(count, mixed, leaf_max);
-    let wanted = if mixed { count } else { count.div_ceil(2) };
-    if full { wanted.max(least) } else { least }
-}
-
-/// Levels below a node of `count` primitives that is halved down to leaves.
-fn levels_to_halve(count: usize, leaf_max: usize) -> usize {
-    let leaves = count.div_ceil(leaf_max).next_power_of_two();
-    // One more level, to part kinds.
-    leaves.trailing_zeros() as usize + 1
-}
-
 /// How nodes are split.
 #[derive(Clone, Copy)]
-pub(super) struct Splitter<'l> {
-    pub limits: &'l Limits,
+pub(super) struct Splitter<'l, 's, 'a> {
+    pub limits: &'l Limits<'s, 'a>,
     pub areas: Areas,
+    /// The area of the whole.
+    pub whole: f32,
 }
 
-impl Splitter<'_> {
+/// What choosing splits takes.
+pub(super) struct Scratch<'s, 'a> {
+    bins: Bins,
+    shapes: Option<Shapes<'s, 'a>>,
+}
+
+impl<'s, 'a> Splitter<'_, 's, 'a> {
+    pub fn scratch(self) -> Scratch<'s, 'a> {
+        let shapes = self.limits.source.as_ref().map(Source::shapes);
+        Scratch { bins: Bins::EMPTY, shapes }
+    }
+
     /// Grows a branch; returns its root.
     pub fn grow_branch(self, branch: &mut Branch) -> Option<BvhNode> {
         let Branch { task: whole, nodes, refs, .. } = branch;
         let mut root = None;
-        let mut bins = Bins::EMPTY;
+        let mut scratch = self.scratch();
         let mut stack = [*whole; MAX_DEPTH];
         let mut pending = 1;
         let mut used = whole.pairs;
@@ -114,11 +124,11 @@ impl Splitter<'_> {
             pending -= 1;
             let task = stack[pending];
             let first = task.first - whole.first;
-            let range = refs.get_mut(first..first + task.count)?;
-            let split = self.part(range, &task, &mut bins);
+            let slots = refs.get_mut(first..first + task.room)?;
+            let split = self.part(slots, &task, &mut scratch);
             let aabb = task.extent.bounds.aabb();
             let node = match &split {
-                None => Grown::leaf(&aabb, range),
+                None => Grown::leaf(&aabb, task.first, slots.get(..task.count)?),
                 Some(_) => BvhNode::inner(&aabb, used),
             };
             match task.node.checked_sub(whole.pairs) {
@@ -126,7 +136,7 @@ impl Splitter<'_> {
                 _ => root = Some(node),
             }
             let Some(split) = split else { continue };
-            let [left, right] = task.children(&split, used);
+            let [left, right] = task.children(&split, used, slots)?;
             used += 2;
             // The left child is taken next, so its subtree is stored before the right one's.
             for child in [right, left] {
@@ -139,32 +149,55 @@ impl Splitter<'_> {
 }
 
 impl Task {
-    /// The tasks of the sides, whose nodes are the pair at `pair`.
-    pub fn children(&self, split: &Split, pair: u32) -> [Task; 2] {
+    /// The tasks of the sides, whose nodes are the pair at `pair`. The right one's refs are moved behind
+    /// the left one's room.
+    pub fn children(&self, split: &Split, pair: u32, slots: &mut [PrimRef]) -> Option<[Task; 2]> {
         let depth = self.depth + 1;
-        let (count, budget) = (split.left_count, share(self, split));
+        let ([count, right_count], budget) = (split.counts, share(self, split));
         let [left, right] = split.sides;
         let (first, pairs) = (self.first, pair + 2);
-        let left = Task { node: pair, pairs, first, count, depth, budget, extent: left };
+        // Each side has its part of the free slots.
+        let free = self.room.checked_sub(count + right_count)?;
+        let room = count + part_of(free, count, count + right_count);
+        if free > 0 {
+            slots.get(..room + right_count)?;
+            slots.copy_within(count..count + right_count, room);
+        }
+        let left = Task { node: pair, pairs, first, count, room, depth, budget, extent: left };
         // A subtree has a pair for each of its leaves but one.
         let pairs = pairs + 2 * (budget as u32).saturating_sub(1);
-        let (first, count) = (first + count, self.count - count);
+        let (first, count, room) = (first + room, right_count, self.room - room);
         let budget = self.budget - budget;
-        [left, Task { node: pair + 1, pairs, first, count, depth, budget, extent: right }]
+        let node = pair + 1;
+        Some([left, Task { node, pairs, first, count, room, depth, budget, extent: right }])
     }
 }
 
 /// The leaves that the left child may have: its share by count, but enough for either side.
 fn share(task: &Task, split: &Split) -> usize {
-    let [least, least_right] = split.least;
+    let ([least, least_right], [left, right]) = (split.least, split.counts);
     let most = task.budget.saturating_sub(least_right).max(least);
-    let fair = (task.budget as u64 * split.left_count as u64 / task.count as u64) as usize;
-    fair.clamp(least, most).min(task.budget)
+    part_of(task.budget, left, left + right).clamp(least, most).min(task.budget)
 }
 
-impl Splitter<'_> {
+/// As much of `all` as `part` is of `whole`, rounded down.
+fn part_of(all: usize, part: usize, whole: usize) -> usize {
+    (all as u64 * part as u64 / whole as u64) as usize
+}
+
+impl Splitter<'_, '_, '_> {
+    /// Parts what the first slots hold in two, or decides for a leaf.
+    pub fn part(self, slots: &mut [PrimRef], task: &Task, scratch: &mut Scratch) -> Option<Split> {
+        let split = self.part_refs(slots.get_mut(..task.count)?, task, &mut scratch.bins)?;
+        if task.count < CUT_FROM || task.room == task.count {
+            return Some(split);
+        }
+        let Some(shapes) = &mut scratch.shapes else { return Some(split) };
+        Some(self.cut(slots, task, &split, shapes).unwrap_or(split))
+    }
+
     /// Parts the refs of a node in two, or decides for a leaf.
-    pub fn part(self, refs: &mut [PrimRef], task: &Task, bins: &mut Bins) -> Option<Split> {
+    fn part_refs(self, refs: &mut [PrimRef], task: &Task, bins: &mut Bins) -> Option<Split> {
         let (Limits { leaf_max, mixed, deep, effort, .. }, areas) = (*self.limits, self.areas);
         let count = refs.len();
         let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
@@ -173,23 +206,17 @@ impl Splitter<'_> {
         if may_be_leaf && (count == 1 || task.budget < 2) {
             return None;
         }
-        let least = |left_count: usize| {
-            [left_count, count - left_count].map(|n| fewest_leaves(n, mixed, leaf_max))
-        };
+        let least = |left_count: usize| self.fewest([left_count, count - left_count]);
         let pays = |work: f32| {
             let area = areas.of(&task.extent.bounds.aabb());
             // Everything on one line or in one point: any split is as good as another.
             STEP_COST * area + work < area * count as f32 || area == 0.0
         };
-        let lasts = |left_count: usize| {
-            let [left, right] = least(left_count);
-            let levels = levels_to_halve(left_count.max(count - left_count), leaf_max);
-            left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
-        };
+        let lasts = |left_count: usize| self.lasts(task, [left_count, count - left_count]);
         let sah = if count <= FEW {
             let sweep = sweep(refs, areas, lasts).filter(|s| !may_be_leaf || deep || pays(s.work));
             sweep.map(|s| Split {
-                left_count: s.left_count,
+                counts: [s.left_count, count - s.left_count],
                 least: least(s.left_count),
                 sides: s.sides,
             })
@@ -211,41 +238,67 @@ impl Splitter<'_> {
             None => Some(split_at(refs, count / 2, least(count / 2))),
         }
     }
+
+    /// Cuts space in two instead, where the sides of `split` overlap and cutting saves work.
+    fn cut(
+        self,
+        slots: &mut [PrimRef],
+        task: &Task,
+        split: &Split,
+        shapes: &mut Shapes,
+    ) -> Option<Split> {
+        let [left, right] = &split.sides;
+        let areas = self.areas;
+        let area = areas.of(&task.extent.bounds.aabb());
+        let least = (OVERLAP * self.whole).max(OVERLAP_OF_NODE * area);
+        if overlap(areas, [&left.bounds, &right.bounds]) <= least {
+            return None;
+        }
+        let work = |i: usize| areas.of_finite(&split.sides[i].bounds) * split.counts[i] as f32;
+        let allowed = |counts: [usize; 2]| {
+            let [left, right] = counts;
+            let fits = left + right <= task.room && left.max(right) < task.count;
+            fits && self.lasts(task, counts)
+        };
+        let refs = slots.get(..task.count)?;
+        let cut = best_cut(refs, &task.extent.bounds, areas, allowed)?;
+        if cut.work >= (1.0 - SAVED) * (work(0) + work(1)) {
+            return None;
+        }
+        let counts = cut.part(slots, task.count, shapes)?;
+        let refs = slots.get(..counts[0] + counts[1])?;
+        Some(Split { counts, ..split_at(refs, counts[0], self.fewest(counts)) })
+    }
+
+    /// The fewest leaves that two sides need.
+    fn fewest(self, counts: [usize; 2]) -> [usize; 2] {
+        let Limits { mixed, leaf_max, .. } = *self.limits;
+        counts.map(|count| fewest_leaves(count, mixed, leaf_max))
+    }
+
+    /// Whether leaves and levels last for these sides.
+    fn lasts(self, task: &Task, counts: [usize; 2]) -> bool {
+        let [left, right] = self.fewest(counts);
+        let levels = levels_to_halve(counts[0].max(counts[1]), self.limits.leaf_max);
+        left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
+    }
 }
 
 fn split_at(refs: &[PrimRef], left_count: usize, least: [usize; 2]) -> Split {
     let (left, right) = refs.split_at(left_count);
-    Split { left_count, least, sides: [Extent::around(left), Extent::around(right)] }
+    let counts = [left.len(), right.len()];
+    Split { counts, least, sides: [Extent::around(left), Extent::around(right)] }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::bvh::branch::grow;
+    use crate::bvh::budget::leaf_budget;
     use crate::caller::Caller;
 
-    #[test]
-    fn budgets_are_enough_for_halving() {
-        for (mixed, leaf_max) in [4, 5, 6].into_iter().flat_map(|n| [(false, n), (true, n)]) {
-            for count in 2..2000 {
-                let fewest = |count| fewest_leaves(count, mixed, leaf_max);
-                let halves = fewest(count / 2) + fewest(count - count / 2);
-                let done = if mixed { 2 } else { 1 };
-                let least = if count <= leaf_max { done } else { halves };
-                assert!(least <= fewest(count), "{count} {mixed} {leaf_max}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_most_primitives_fit_the_depth() {
-        assert!(levels_to_halve(1 << 30, 4) < MAX_DEPTH - 32);
-        assert_eq!((levels_to_halve(5, 5), levels_to_halve(6, 5)), (1, 2));
-        assert_eq!((levels_to_halve(6, 6), levels_to_halve(7, 6)), (1, 2));
-    }
-
     /// Levels of a tree, the root's included.
-    fn levels(nodes: &[BvhNode]) -> usize {
+    pub(in crate::bvh) fn levels(nodes: &[BvhNode]) -> usize {
         let mut depth = std::vec![1; nodes.len()];
         for (i, node) in nodes.iter().enumerate().filter(|(i, node)| *i != 1 && !node.is_leaf()) {
             depth[node.first as usize] = depth[i] + 1;
@@ -256,7 +309,7 @@ mod tests {
 
     /// Boxes each `ratio` times as large and as far away as the one before: SAH parts the largest from
     /// the others, again and again.
-    fn series(count: usize, ratio: f64) -> std::vec::Vec<PrimRef> {
+    pub(in crate::bvh) fn series(count: usize, ratio: f64) -> std::vec::Vec<PrimRef> {
         let start = ratio.powi(-(count as i32) / 2);
         let boxes = (0..count).map(|i| {
             let size = (start * ratio.powi(i as i32)) as f32;
@@ -275,11 +328,11 @@ mod tests {
                 let leaves = leaf_budget(count, false, leaf_max, true);
                 let mut refs = series(count, ratio);
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
-                let limits =
-                    Limits { leaves, leaf_max, mixed: false, deep, effort: Effort::BALANCED };
-                let used =
-                    grow(&mut nodes, &mut refs, &limits, &Caller::new(None, None)).expect("room");
-                let levels = levels(&nodes[..used]);
+                let effort = Effort::BALANCED;
+                let limits = Limits { leaves, source: None, leaf_max, mixed: false, deep, effort };
+                let caller = &Caller::new(None, None);
+                let used = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");
+                let levels = levels(&nodes[..used.nodes]);
                 assert!(levels <= MAX_DEPTH, "{ratio} {leaf_max}: {levels}");
                 deepest = deepest.max(levels);
             }

@@ -1,18 +1,21 @@
 //! The wide layouts: from a scene to bundles in the caller's memory.
 
 use super::How;
-use super::branch::grow;
+use super::branch::{Size, grow, unevenness};
+use super::budget::leaf_budget;
 use super::choose::choose;
 use super::collapse::Grounds;
 use super::compact;
 use super::emit::{Chosen, Sizes};
 use super::fill::pack;
 use super::refs::{PrimRef, gather};
+use super::reinsert::mend;
+use super::spatial::Source;
 use super::split::Areas;
-use super::tree::{Limits, leaf_budget};
+use super::tree::Limits;
 use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
-use crate::block::{BvhNode, Census, Counts, KIND_BVH, PartsMut};
+use crate::block::{BvhNode, Census, Counts, Geometry, KIND_BVH, PartsMut};
 use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::prim::{Survey, geometries};
@@ -27,36 +30,60 @@ fn leaf_max(strip: usize) -> usize {
     if strip == 1 { LEAF_MAX } else { TRIANGLES / (strip + 2) }
 }
 
-/// Where the scratch lies while the tree grows: behind all that is finished, at the end of the
-/// memory.
+/// Where the scratch lies: behind all that is finished.
 ///
 /// ```text
-/// | header | geometries | ...      | refs                | nodes |    growing
-/// | header | geometries | ...      | choices | ids       | nodes |    choosing
+/// | header | geometries | refs             ...          | nodes |    growing
+/// | header | geometries | scratch   ...           | ids | nodes |    mending
+/// | header | geometries | ...         | choices | ids   | nodes |    choosing
 /// | header | geometries | prim_ids | bundles | choices | ids | nodes | emitting
 /// | header | geometries | prim_ids | bundles | spheres | triangles | packing
 /// ```
 struct Places {
     refs: usize,
     nodes: usize,
+    /// Refs at most: more than primitives, where some may be cut in two.
+    room: usize,
     /// Leaves of the binary tree at most.
     leaves: usize,
 }
 
 impl Places {
-    /// The places in memory of `size` bytes; `None` when they do not fit.
+    /// The places in memory of `size` bytes for what a scene without large primitives wants; `None` when
+    /// they do not fit.
     fn new(survey: &Survey, census: &Census, size: usize) -> Option<Places> {
-        let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-        let prims = census.hittable() as usize;
+        let mixed = census.is_mixed();
+        let room = census.hittable() as usize;
         // More leaves, a half of the primitives or all, made no ray faster: the collapse puts them
         // together again.
-        let leaves = leaf_budget(prims, mixed, LEAF_MAX, false);
-        let nodes = (size / ALIGNMENT * ALIGNMENT)
-            .checked_sub(leaves.checked_mul(2 * size_of::<BvhNode>())?)?;
-        let refs = nodes.checked_sub(prims.checked_mul(size_of::<PrimRef>())?)?;
-        (refs >= front(survey)?).then_some(Places { refs, nodes, leaves })
+        let leaves = leaf_budget(room, mixed, LEAF_MAX, false);
+        let places = Places { refs: front(survey)?, nodes: 0, room, leaves };
+        places.fitting(room, leaves, size)
+    }
+
+    /// The same with other numbers of refs and leaves, if they fit.
+    fn fitting(&self, room: usize, leaves: usize, size: usize) -> Option<Places> {
+        let nodes = (size / ALIGNMENT * ALIGNMENT).checked_sub(leaves.checked_mul(PAIR)?)?;
+        let refs = self.refs;
+        let end = refs.checked_add(room.checked_mul(size_of::<PrimRef>())?)?;
+        (end <= nodes).then_some(Places { refs, nodes, room, leaves })
+    }
+
+    /// What an uneven scene wants at the best quality, as far as `size` bytes reach: a leaf for every other ref, as a wall
+    /// shall not be in one with a chair; and, if refs may be cut, a quarter more of them, which takes half
+    /// of what is free at most.
+    fn for_uneven(self, cut: bool, size: usize) -> Places {
+        const REF: usize = size_of::<PrimRef>();
+        let free = self.nodes - self.refs - self.room * REF;
+        let more = if cut { (self.room / 4).min(free / (2 * REF)) } else { 0 };
+        let most = self.leaves + (free - more * REF) / PAIR;
+        let (room, leaves) = (self.room + more, ((self.room + more) / 2).clamp(self.leaves, most));
+        self.fitting(room, leaves, size).unwrap_or(self)
     }
 }
+
+/// What the nodes of one more leaf take.
+const PAIR: usize = 2 * size_of::<BvhNode>();
 
 /// The end of header and geometries.
 fn front(survey: &Survey) -> Option<usize> {
@@ -80,15 +107,16 @@ pub(crate) fn needs_wide(
     let lanes = 3 * u64::from(triangle_blocks + sphere_blocks) / 2;
     let bundles = 2 + lanes / u64::from(width);
     let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks };
-    let finished = counts(survey, census, &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
+    let finished =
+        counts(survey, census.hittable(), &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
     Ok((compact.max(finished.end), minimum))
 }
 
 /// The parts of the finished block.
-fn counts(survey: &Survey, census: &Census, sizes: &Sizes, width: u32) -> Counts {
+fn counts(survey: &Survey, prim_ids: u32, sizes: &Sizes, width: u32) -> Counts {
     Counts {
         geometries: survey.geometry_count,
-        prim_ids: census.hittable(),
+        prim_ids,
         bundle_lanes: sizes.bundles.saturating_mul(width),
         sphere_blocks: sizes.sphere_blocks,
         triangle_blocks: sizes.triangle_blocks,
@@ -136,65 +164,104 @@ where
 {
     let places = Places::new(survey, census, bytes.len())?;
     how.caller.done(0.1)?;
-    let nodes = grow_tree(scene, survey, census, &places, how, bytes)?;
+    let scratch = grow_tree(scene, survey, census, places, how, bytes)?;
     how.caller.done(0.6)?;
-    let scratch = Scratch::new(census, &places, nodes)?;
-    let prims = census.hittable();
+    let prims = scratch.prims as u32;
+    let first_sphere = scratch.prims - census.sphere_count as usize;
     let areas = Areas::new(&census.bounds);
     let whole = areas.of(&census.bounds);
     let mean = whole / prims as f32;
     for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
         let sizes = scratch.choose::<W>(scene, survey, areas, price, how.caller, bytes)?;
-        let counts = counts(survey, census, &sizes, W as u32);
+        let counts = counts(survey, prims, &sizes, W as u32);
         let at = counts.offsets()?;
         if at.words <= scratch.choices && at.end <= bytes.len() {
             how.caller.done(0.85)?;
-            scratch.emit::<W>(census, &counts, bytes)?;
-            pack(scene, census.triangle_count as usize, counts.parts_mut(bytes)?, how.caller)?;
+            scratch.emit::<W>(first_sphere, &counts, bytes)?;
+            pack(scene, first_sphere, counts.parts_mut(bytes)?, how.caller)?;
             return counts.seal(KIND_BVH, W as u32, census, bytes);
         }
     }
     None
 }
 
-/// Grows the binary tree, and moves the ids behind the refs' place; returns the number of nodes.
+/// Grows the binary tree, and moves the ids to the end of the refs' place.
 fn grow_tree(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
-    places: &Places,
+    places: Places,
     how: &How,
     bytes: &mut [u8],
-) -> Option<usize> {
-    let front = Counts { geometries: survey.geometry_count, ..Counts::default() };
-    geometries(scene, front.parts_mut(bytes)?.geometries);
-    let prims = census.hittable() as usize;
+) -> Option<Scratch> {
+    let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
+    geometries(scene, table.parts_mut(bytes)?.geometries);
+    let areas = Areas::new(&census.bounds);
+    let refs = storage::view_mut::<PrimRef>(bytes, places.refs, places.room)?;
+    let Gathered { count, strip, leaves } = gather_strips(scene, census, places.leaves, how, refs);
+    let uneven = how.effort.for_uneven(unevenness(refs.get(..count)?, areas, how.caller));
+    let mends = uneven.is_some_and(|effort| effort.mends);
+    // Spheres are not cut.
+    let cut = mends && census.sphere_count == 0;
+    let places = match mends {
+        true => places.for_uneven(cut, bytes.len()),
+        false => Places { leaves, ..places },
+    };
     let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
-    let refs = storage::view_mut::<PrimRef>(front, places.refs, prims)?;
-    let mixed = census.triangle_count > 0 && census.sphere_count > 0;
-    let mut strip = if mixed { 1 } else { how.effort.strip };
-    let (ref_count, leaves) = loop {
-        let ref_count = gather(scene, census, strip, how.caller, refs);
-        let leaves = leaf_budget(ref_count, mixed, leaf_max(strip), false);
-        // Where strips are shorter than they may be, there may be more leaves than room for them.
-        if leaves <= places.leaves || strip == 1 {
-            break (ref_count, leaves);
-        }
-        strip /= 2;
+    let (front, refs) = front.split_at_mut_checked(places.refs)?;
+    let slots = storage::view_mut::<PrimRef>(refs, 0, places.room)?;
+    let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
+    let limits = Limits {
+        leaves: places.leaves,
+        source: cut.then_some(Source { scene, geometries }),
+        leaf_max: leaf_max(strip),
+        mixed: census.is_mixed(),
+        deep: true,
+        effort: uneven.unwrap_or(how.effort),
     };
-    let refs = refs.get_mut(..ref_count)?;
-    let limits =
-        Limits { leaves, leaf_max: leaf_max(strip), mixed, deep: true, effort: how.effort };
-    let count = grow(nodes, refs, &limits, how.caller)?;
-    spread_ids(storage::view_mut::<u32>(front, places.refs, 8 * prims)?, ref_count)?;
-    Some(count)
+    let size = grow(nodes, slots, count, &limits, how.caller)?;
+    let (free, ids) = ids_to_end(refs, &size)?;
+    if mends {
+        mend(nodes.get_mut(..size.nodes)?, ids, areas, free)?;
+    }
+    Scratch::new(&places, &size)
 }
 
-/// From the last on, the ids of each ref go to the end of the refs' place, onto refs that are done.
-fn spread_ids(words: &mut [u32], ref_count: usize) -> Option<()> {
+/// Refs of up to `strip` triangles, and the leaves that a tree over them takes.
+struct Gathered {
+    count: usize,
+    strip: usize,
+    leaves: usize,
+}
+
+/// Gathers refs of the longest strips for which there is room, which is `room` leaves.
+fn gather_strips(
+    scene: &Scene,
+    census: &Census,
+    room: usize,
+    how: &How,
+    refs: &mut [PrimRef],
+) -> Gathered {
+    let mixed = census.is_mixed();
+    let mut strip = if mixed { 1 } else { how.effort.strip };
+    loop {
+        let count = gather(scene, census, strip, how.caller, refs);
+        let leaves = leaf_budget(count, mixed, leaf_max(strip), false);
+        // Where strips are shorter than they may be, there may be more leaves than room for them.
+        if leaves <= room || strip == 1 {
+            return Gathered { count, strip, leaves };
+        }
+        strip /= 2;
+    }
+}
+
+/// Moves the ids of all refs to the end of their place; returns what is free before them, and them.
+fn ids_to_end<'p>(place: &'p mut [u8], size: &Size) -> Option<(&'p mut [u8], &'p mut [u32])> {
+    let words = storage::view_mut::<u32>(place, 0, place.len() / size_of::<u32>())?;
     let mut end = words.len();
-    for at in (0..8 * ref_count).step_by(8).rev() {
+    // From the last on, those of each ref go onto refs that are done.
+    for at in (0..8 * size.refs).step_by(8).rev() {
         let [id, count] = PrimRef::ids_of(words.get(at..at + 8)?.try_into().ok()?);
         let start = end.checked_sub(count as usize)?;
         for (word, id) in words.get_mut(start..end)?.iter_mut().zip(id..) {
@@ -202,7 +269,8 @@ fn spread_ids(words: &mut [u32], ref_count: usize) -> Option<()> {
         }
         end = start;
     }
-    Some(())
+    let (free, ids) = place.split_at_mut_checked(size_of::<u32>() * end)?;
+    Some((free, storage::view_mut(ids, 0, size.prims)?))
 }
 
 /// The tree, its choices and the ids, at the end of the memory.
@@ -216,12 +284,12 @@ struct Scratch {
 }
 
 impl Scratch {
-    fn new(census: &Census, places: &Places, node_count: usize) -> Option<Scratch> {
-        let prims = census.hittable() as usize;
-        let pairs = node_count / 2 - 1;
-        let ids = places.nodes - 4 * prims;
+    fn new(places: &Places, size: &Size) -> Option<Scratch> {
+        let pairs = size.nodes / 2 - 1;
+        let ids = places.nodes - 4 * size.prims;
         let choices = (ids / 8 * 8).checked_sub(8 * pairs)?;
-        Some(Scratch { choices, pairs, ids, prims, nodes: places.nodes, node_count })
+        let (prims, nodes, node_count) = (size.prims, places.nodes, size.nodes);
+        Some(Scratch { choices, pairs, ids, prims, nodes, node_count })
     }
 
     fn choose<const W: usize>(
@@ -245,7 +313,12 @@ impl Scratch {
         Chosen { nodes, choices, ids }.sizes::<W>()
     }
 
-    fn emit<const W: usize>(&self, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Option<()>
+    fn emit<const W: usize>(
+        &self,
+        first_sphere: usize,
+        counts: &Counts,
+        bytes: &mut [u8],
+    ) -> Option<()>
     where
         Bundle<W>: Plain,
     {
@@ -258,7 +331,7 @@ impl Scratch {
         let PartsMut { prim_ids, bundles, .. } = front_counts.parts_mut(front)?;
         let count = bundles.len() / (W * LANE);
         let bundles = storage::view_mut::<Bundle<W>>(bundles, 0, count)?;
-        chosen.emit(bundles, prim_ids, census.triangle_count as usize)
+        chosen.emit(bundles, prim_ids, first_sphere)
     }
 }
 

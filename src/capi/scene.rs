@@ -99,7 +99,8 @@ struct Elements<'a, T> {
     memory: PhantomData<&'a [T]>,
 }
 
-// SAFETY: elements are only read, by copying them, and nobody writes to them during `'a`.
+// SAFETY: elements are only read, by copying them, and nobody writes to them during `'a`, as `new` was promised;
+// pointers in them are read as numbers.
 unsafe impl<T> Sync for Elements<'_, T> {}
 
 impl<'a, T: Growing> Elements<'a, T> {

@@ -281,6 +281,11 @@ impl Census {
     pub fn hittable(&self) -> u32 {
         self.triangle_count + self.sphere_count
     }
+
+    /// Whether there are triangles and spheres that can be hit.
+    pub fn is_mixed(&self) -> bool {
+        self.triangle_count > 0 && self.sphere_count > 0
+    }
 }
 
 /// What is wrong with triangle `id`, which has no vertices.
