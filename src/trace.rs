@@ -212,7 +212,7 @@ fn trace<S: Simd, Q: Query>(
             KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
             KIND_GRID => {
                 let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
-                grid::walk(s, &Cells { grids, words, runs, leaves }, ray, query)
+                grid::walk(s, &Cells { grids, words, runs, leaves }, ray, slab, query)
             }
             _ => leaves.intersect_all(s, ray, slab, query),
         },

@@ -42,18 +42,17 @@ impl Overlap {
         }
         let mut overlap = Overlap { edges: [[[0.0; 3]; 3]; 3], normal: [0.0; 3], plane: [0.0; 2] };
         let mut sizes = [0.0; 2];
-        for k in 0..3 {
-            let [x, y] = ACROSS[k];
+        for (k, [x, y]) in ACROSS.into_iter().enumerate() {
             overlap.normal[k] = edge(0, x) * edge(1, y) - edge(0, y) * edge(1, x);
             for (i, size) in sizes.iter_mut().enumerate() {
                 *size += edge(i, k).abs();
             }
             let side = if overlap.normal[k] < 0.0 { -1.0 } else { 1.0 };
-            for i in 0..3 {
+            for (i, corner) in corners.iter().enumerate() {
                 let (nx, ny) = (-edge(i, y) * side, edge(i, x) * side);
                 let widths = [1.0 + 2.0 * dilation[x], 1.0 + 2.0 * dilation[y]];
                 let reach = nx.max(0.0) * widths[0] + ny.max(0.0) * widths[1];
-                let from = [corners[i][x] + dilation[x], corners[i][y] + dilation[y]];
+                let from = [corner[x] + dilation[x], corner[y] + dilation[y]];
                 overlap.edges[k][i] = [nx, ny, reach - nx * from[0] - ny * from[1]];
             }
         }
@@ -76,9 +75,8 @@ impl Overlap {
         let [a, b, c] = self.normal;
         let at = a * corner[0] + b * corner[1] + c * corner[2];
         let mut apart = (at < self.plane[0]) | (at > self.plane[1]);
-        for k in 0..3 {
-            let [x, y] = ACROSS[k];
-            for [nx, ny, least] in self.edges[k] {
+        for ([x, y], edges) in ACROSS.into_iter().zip(&self.edges) {
+            for [nx, ny, least] in edges {
                 apart |= nx * corner[x] + ny * corner[y] + least < 0.0;
             }
         }

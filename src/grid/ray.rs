@@ -38,12 +38,12 @@ impl CellRay {
         let mut turned =
             CellRay { origin: [0.0; 3], direction: [0.0; 3], turned: [0; 3], resolution };
         let per_t = inverse_power_of_two(ray.t_scale);
-        for k in 0..3 {
+        for (k, n) in resolution.into_iter().enumerate() {
             let origin = (f64::from(ray.given.origin[k]) - head.lower[k]) * head.per_length[k];
             let direction = f64::from(ray.given.direction[k]) * (head.per_length[k] * per_t);
             let falls = direction < 0.0;
             turned.turned[k] = u32::from(falls).wrapping_neg();
-            turned.origin[k] = if falls { f64::from(resolution[k]) - origin } else { origin };
+            turned.origin[k] = if falls { f64::from(n) - origin } else { origin };
             let speed = direction.abs();
             turned.direction[k] = if speed < SLOWEST { SLOWEST } else { speed };
         }

@@ -108,11 +108,11 @@ impl Space {
             resolution,
             dilation: [0.0; 3],
         };
-        for k in 0..3 {
+        for (k, n) in resolution.into_iter().map(f64::from).enumerate() {
             let flat = proportions[k] == 0.0;
-            let cells = if flat { 1.0 } else { f64::from(resolution[k]) };
+            let cells = if flat { 1.0 } else { n };
             // Far from zero a flat axis is made so thick that rounding its walls takes nothing of note.
-            let flat_cell = (widest / f64::from(resolution[k])).max(lower[k].abs() * THICK);
+            let flat_cell = (widest / n).max(lower[k].abs() * THICK);
             let cell = if flat { flat_cell } else { extent[k] / cells };
             let margin = if flat { cell / 2.0 } else { MARGIN * cell };
             space.lower[k] = lower[k] - margin;
@@ -136,8 +136,8 @@ impl Space {
     /// A grid in the cell at a place.
     pub fn within(&self, cell: Place, resolution: [u32; 3]) -> Self {
         let mut space = Space { resolution, place: cell, ..*self };
-        for k in 0..3 {
-            space.place.scale[k] *= f64::from(resolution[k]);
+        for (k, n) in resolution.into_iter().map(f64::from).enumerate() {
+            space.place.scale[k] *= n;
             space.dilation[k] = dilation(self.outermost[k] * space.place.scale[k]);
         }
         space

@@ -152,8 +152,8 @@ impl<V: Lanes<4>> Level<V> {
     #[inline(always)]
     fn word_of(&self, cell: [i32; 4]) -> u32 {
         let mut word = self.corner;
-        for k in 0..3 {
-            word = word.wrapping_add((cell[k] as u32).wrapping_mul(self.strides[k]));
+        for (cell, stride) in cell.into_iter().zip(self.strides) {
+            word = word.wrapping_add((cell as u32).wrapping_mul(stride));
         }
         word
     }
@@ -215,9 +215,9 @@ impl<V: Lanes<4>> Level<V> {
         self.wall = self.wall.min(self.last);
         let mut from = [0.0; 4];
         self.from.store(&mut from);
-        for k in 0..3 {
+        for (k, from) in from.iter_mut().enumerate() {
             if axes >> k & 1 == 1 {
-                from[k] = STOPPED;
+                *from = STOPPED;
             }
         }
         self.from = Width::<4>::load(s, &from);

@@ -7,7 +7,7 @@ use crate::block::cells::{
 };
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
-use crate::ray::{PreparedRay, WideSlab};
+use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::simd::{Scalar, Simd, Width};
 
 /// The parts of a block that a walk reads.
@@ -28,6 +28,7 @@ pub(crate) fn walk<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
     ray: &PreparedRay,
+    slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     for head in cells.grids {
@@ -38,7 +39,7 @@ pub(crate) fn walk<S: Simd, Q: Query>(
             query.watch().step();
             let word = cells.words.get(first + 1).copied().unwrap_or(EMPTY);
             if let Cell::Run(run) = cell(word) {
-                if visit(s, cells, run, ray, query) {
+                if visit(s, cells, run, ray, slab, query) {
                     return true;
                 }
                 continue;
@@ -57,7 +58,7 @@ pub(crate) fn walk<S: Simd, Q: Query>(
         }
         let part = Part { start, exit };
         let level = Level::outermost(s, &cell_ray, head.first_word, part, t_bound);
-        if walk_one(s, cells, level, cell_ray.turned, ray, query) {
+        if walk_one(s, cells, level, cell_ray.turned, ray, slab, query) {
             return true;
         }
     }
@@ -79,6 +80,7 @@ fn walk_one<S: Simd, Q: Query>(
     mut level: Level<<S as Width<4>>::V>,
     turned: [u32; 3],
     ray: &PreparedRay,
+    slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     let octant = turned[0] & 1 | turned[1] & 2 | turned[2] & 4;
@@ -94,7 +96,7 @@ fn walk_one<S: Simd, Q: Query>(
                 goes_on = if side > 0 { level.jump(s, SIDES[side]) } else { level.step(s) };
             }
             Cell::Run(first) => {
-                if visit(s, cells, first, ray, query) {
+                if visit(s, cells, first, ray, slab, query) {
                     return true;
                 }
                 level.look_up_to(s, query.t_bound());
@@ -123,17 +125,23 @@ fn walk_one<S: Simd, Q: Query>(
     }
 }
 
-/// Offers `query` what the ray meets among the primitives of a run.
+/// Offers `query` what the ray meets among the primitives of a run, block by block if it comes into their boxes: in a cell's corner
+/// there may be little of it.
 #[inline(always)]
 fn visit<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
     first: usize,
     ray: &PreparedRay,
+    slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     for run in cells.runs.get(first..).unwrap_or(&[]) {
-        if cells.leaves.intersect(s, run.leaf(), ray, query) {
+        let leaf = run.leaf();
+        let aabb = cells.leaves.aabb((leaf.kind(), leaf.number()));
+        if !slab.part(&aabb, query.t_bound()).is_empty()
+            && cells.leaves.intersect(s, leaf, ray, query)
+        {
             return true;
         }
         if run.is_last() {
