@@ -13,7 +13,9 @@ mod lists;
 use super::options::GridOptions;
 use super::space::Space;
 use crate::block::cells::{LAST, Run, resolution_word, run_word};
-use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, SPHERES, TRIANGLES_AT_LEAST, block_ref};
+use crate::block::leaf::{
+    KIND_SPHERES, KIND_TRIANGLES, SPHERES, TRIANGLES_AT_LEAST, TriangleBlock, block_ref,
+};
 use crate::block::{Census, Counts, KIND_GRID, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
 use crate::prim::{Survey, pack_in_order};
@@ -60,7 +62,7 @@ pub(super) fn build(
     options: &GridOptions,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
-    let mut most = lists::Room::most_refs(survey, bytes.len());
+    let mut most = lists::Room::most_refs(survey, bytes.len()).min(most_packed(scene, bytes.len()));
     while most > u64::from(census.hittable()) {
         let Some(grown) = grow::grow(scene, survey, census, options, most, bytes) else { break };
         if let Some(size) = emit::emit(scene, survey, census, &grown, bytes) {
@@ -69,6 +71,22 @@ pub(super) fn build(
         most = most / 4 * 3;
     }
     build_one_cell(scene, survey, census, bytes)
+}
+
+/// How many numbers can be listed so that the blocks fit, roughly: what does not is tried again.
+///
+/// A block holds 14 triangles of a closed mesh, which has half a vertex for each, and 5 that share none.
+fn most_packed(scene: &Scene, size: usize) -> u64 {
+    let (mut triangles, mut vertices) = (1, 1);
+    for mesh in (0..scene.mesh_count()).filter_map(|m| scene.mesh(m)) {
+        triangles += mesh.triangle_count();
+        // Those that stand in threes may be equal.
+        let vertex_count = mesh.vertex_count().min(3 * mesh.triangle_count());
+        vertices += if mesh.is_indexed() { vertex_count } else { mesh.triangle_count() / 2 };
+    }
+    let in_a_block = (7.2 * triangles as f64 / vertices as f64).clamp(5.0, 14.0);
+    // A number in a list, one in the block, a part of a run and of a word.
+    (size as f64 / (size_of::<TriangleBlock>() as f64 / in_a_block + 12.0)) as u64
 }
 
 /// All primitives in one cell, in the order of their numbers.
