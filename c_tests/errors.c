@@ -78,6 +78,10 @@ static void check_builds(void) {
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.refit = 2);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.plain_list = 3);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.layout = 12);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.struct_size = offsetof(RtBuildOptions, grid_kind) - 1);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_kind = 3);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_density = -1.0f);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.rays_per_prim = -1.0f);
     REFUSED(RT_ERROR_UNSUPPORTED, options.refit = 1);
 
     // A newer caller: accepted while what we do not know is zero, alone and in arrays.

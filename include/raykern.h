@@ -64,6 +64,13 @@
 // Test every ray against every leaf block.
 #define RT_PLAIN_LIST_ALWAYS 2
 
+// `RtBuildOptions.grid_kind`: a coarse grid whose full cells hold finer ones.
+#define RT_GRID_NESTED 0
+// Cells of one size.
+#define RT_GRID_UNIFORM 1
+// Two cells along each axis, and again two in each that is full.
+#define RT_GRID_OCTREE 2
+
 // `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
 // same answer from every structure; `t` is the nearest float.
 #define RT_PRECISION_EXACT 0
@@ -187,6 +194,15 @@ typedef struct RtBuildOptions {
     RtParallelFor parallel_for;
     // Or null.
     RtProgress progress;
+    // One of `RT_GRID_`, for a grid.
+    uint32_t grid_kind;
+    // Cells for each primitive, of the outermost grid if they are nested, at most 64; not negative. 0: for a uniform grid the cube
+    // root of the number of primitives along each axis, otherwise a fiftieth.
+    float grid_density;
+    // How deep grids may be nested, the outermost counted, up to 8; 0: 8.
+    uint32_t grid_depth;
+    // For `rt_build`, how many rays for each primitive will be traced before the next build; not negative. 0: many.
+    float rays_per_prim;
 } RtBuildOptions;
 
 // How much memory a build wants, in bytes.
@@ -349,6 +365,11 @@ RtStatus rt_grid_needs(const RtScene *scene,
                        const RtBuildOptions *options,
                        RtMemory *out);
 
+// Writes to `*out` the memory that `rt_build` needs for `scene`. `options` may be null.
+RtStatus rt_needs(const RtScene *scene,
+                  const RtBuildOptions *options,
+                  RtMemory *out);
+
 // Builds a bounding volume hierarchy over `scene` in `memory`, which has `size` bytes and starts at
 // a multiple of 64. `options` may be null.
 //
@@ -363,7 +384,16 @@ RtStatus rt_build_bvh(const RtScene *scene,
                       size_t size,
                       const RtAccel **out);
 
-// Builds a regular grid: all else as `rt_build_bvh`.
+// Builds what is likely to take the least time, building it and tracing `options->rays_per_prim` rays for each primitive: a
+// list, a grid or a BVH; `rt_accel_info` says which it is. All else as `rt_build_bvh`.
+RtStatus rt_build(const RtScene *scene,
+                  const RtBuildOptions *options,
+                  void *memory,
+                  size_t size,
+                  const RtAccel **out);
+
+// Builds a grid, of the kind that the options name: all else as `rt_build_bvh`. With less memory it is coarser, in the last
+// resort one cell.
 RtStatus rt_build_grid(const RtScene *scene,
                        const RtBuildOptions *options,
                        void *memory,
@@ -483,7 +513,8 @@ RT_RAYKERN_ASSERT(size_of_sphere_set, sizeof(RtSphereSet) == sizeof(void *) + 16
 RT_RAYKERN_ASSERT(size_of_instance, sizeof(RtInstance) == sizeof(void *) + 56);
 RT_RAYKERN_ASSERT(size_of_scene, sizeof(RtScene) == 3 * sizeof(void *) + 32);
 RT_RAYKERN_ASSERT(scene_meshes, offsetof(RtScene, meshes) == 32);
-RT_RAYKERN_ASSERT(size_of_options, sizeof(RtBuildOptions) == 3 * sizeof(void *) + 24);
+RT_RAYKERN_ASSERT(size_of_options, sizeof(RtBuildOptions) == 3 * sizeof(void *) + 40);
+RT_RAYKERN_ASSERT(options_grid_kind, offsetof(RtBuildOptions, grid_kind) == 3 * sizeof(void *) + 24);
 RT_RAYKERN_ASSERT(options_user, offsetof(RtBuildOptions, user) == 24);
 RT_RAYKERN_ASSERT(size_of_query, sizeof(RtQuery) == 32);
 RT_RAYKERN_ASSERT(size_of_memory, sizeof(RtMemory) == 3 * sizeof(size_t));

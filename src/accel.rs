@@ -1,6 +1,7 @@
 //! The face of a built structure.
 
 use crate::batch;
+use crate::block::cells::resolution;
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST};
 use crate::bvh;
 use crate::error::OpenError;
@@ -55,7 +56,7 @@ pub struct Info {
     pub sphere_count: u32,
     /// Triangles without area, spheres without radius, and whatever is not finite.
     pub ignored_count: u32,
-    /// Cells along each axis of a grid, zero otherwise.
+    /// Cells along each axis of a grid, of the outermost one if they are nested; zero otherwise.
     pub resolution: [u32; 3],
     /// The bytes of the whole block.
     pub size: usize,
@@ -108,7 +109,7 @@ impl<'m> Accel<'m> {
         let structure = match (header.kind, bundles) {
             (KIND_LIST, Bundles::None) => no_grid && no_nodes,
             (KIND_GRID, Bundles::None) => {
-                no_nodes && grid::grid_is_sound(grids, words, runs, &leaves)
+                no_nodes && grid::grids_are_sound(grids, words, runs, &leaves)
             }
             (KIND_BVH, Bundles::None) => no_grid && bvh::tree_is_sound(nodes, &leaves),
             (KIND_BVH, Bundles::Four(bundles)) => {
@@ -155,7 +156,10 @@ impl<'m> Accel<'m> {
             triangle_count: header.triangle_count,
             sphere_count: header.sphere_count,
             ignored_count: header.ignored_count,
-            resolution: grids.first().map_or([0; 3], |grid| grid.resolution),
+            resolution: grids
+                .last()
+                .and_then(|grid| words.get(grid.first_word as usize))
+                .map_or([0; 3], |word| resolution(*word)),
             size: whole.bytes().len(),
             structure_size: size_of_val(grids)
                 + size_of_val(nodes)

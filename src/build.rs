@@ -7,11 +7,13 @@ use crate::accel::{Accel, Layout};
 use crate::block::Census;
 use crate::bvh::{self, Effort, How};
 use crate::caller::{Caller, Threads};
+use crate::choice::suits_grid;
 use crate::error::{BuildError, Unsupported};
+use crate::grid::{self, GridKind, GridOptions};
+use crate::list;
 use crate::prim::{Survey, survey};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT};
-use crate::{grid, list};
 
 /// How much memory a build wants.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +63,10 @@ pub struct BuildOptions<'a> {
     pub refit: bool,
     /// Whether a plain list may stand in.
     pub plain_list: PlainList,
+    /// How a grid divides space.
+    pub grid: GridOptions,
+    /// For [`build`], how many rays for each primitive will be traced before the next build; zero means many.
+    pub rays_per_prim: f32,
     /// Threads that the build may use, and its `needs`; none of them is kept. They check the scene and build a BVH; a grid
     /// is built by the caller's own.
     pub threads: Option<&'a dyn Threads>,
@@ -76,6 +82,8 @@ impl fmt::Debug for BuildOptions<'_> {
             .field("layout", &self.layout)
             .field("refit", &self.refit)
             .field("plain_list", &self.plain_list)
+            .field("grid", &self.grid)
+            .field("rays_per_prim", &self.rays_per_prim)
             .field("threads", &self.threads.map(|threads| threads.worker_count()))
             .field("progress", &self.progress.is_some())
             .finish()
@@ -89,7 +97,7 @@ pub fn bvh_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildE
 
 /// The memory [`build_grid`] needs for `scene`.
 pub fn grid_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError> {
-    Ok(Job::new(scene, options, Structure::Grid)?.memory)
+    Ok(Job::new(scene, options, Structure::Grid(options.grid))?.memory)
 }
 
 /// Builds a BVH over `scene` at the front of `memory`.
@@ -106,25 +114,44 @@ pub fn build_bvh<'m>(
     Job::new(scene, options, options.bvh())?.run_in(memory)
 }
 
-/// Builds a regular grid over `scene` at the front of `memory`.
+/// Builds a grid over `scene` at the front of `memory`.
 ///
 /// `memory` starts at a multiple of 64 bytes and holds at least the minimum of [`grid_needs`]; with
-/// less than its size the grid is coarser, a fifth of its cells along each axis at a time. The
-/// finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
+/// less than its size the grid is coarser. In a uniform one the cells along each axis become fewer by a fifth, and again. In a nested one cells
+/// that come later stay whole when there is no more room, those of the deepest grids first; if leaf blocks then do not fit, less
+/// is listed by a quarter, and again; and where the outermost grid has no room it is halved along each axis. The last resort is one
+/// cell. The finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
 /// written.
 pub fn build_grid<'m>(
     scene: &Scene,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, Structure::Grid)?.run_in(memory)
+    Job::new(scene, options, Structure::Grid(options.grid))?.run_in(memory)
+}
+
+/// The memory [`build`] needs for `scene`.
+pub fn needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError> {
+    Ok(Job::new(scene, options, Structure::Automatic)?.memory)
+}
+
+/// Builds at the front of `memory` what is likely to take the least time over `scene`, building it and tracing
+/// [`rays_per_prim`](BuildOptions::rays_per_prim): a list, a grid or a BVH. All else as [`build_bvh`] and [`build_grid`].
+pub fn build<'m>(
+    scene: &Scene,
+    options: &BuildOptions,
+    memory: &'m mut [MaybeUninit<u8>],
+) -> Result<Accel<'m>, BuildError> {
+    Job::new(scene, options, Structure::Automatic)?.run_in(memory)
 }
 
 /// What a build makes of a scene.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Structure {
+    /// Whichever of the others the scene and the options suggest.
+    Automatic,
     List,
-    Grid,
+    Grid(GridOptions),
     Bvh,
     /// A BVH of bundles with this many lanes.
     Wide(u32),
@@ -154,11 +181,18 @@ impl<'s, 'a> Job<'s, 'a> {
             PlainList::Never => 0,
             PlainList::Always => u32::MAX,
         };
-        let structure = if census.hittable() <= handful { Structure::List } else { asked };
+        let structure = match asked {
+            _ if census.hittable() <= handful => Structure::List,
+            Structure::Automatic if suits_grid(scene, &census, options.rays_per_prim) => {
+                Structure::Grid(GridOptions { kind: GridKind::Uniform, ..options.grid })
+            }
+            Structure::Automatic => options.bvh(),
+            asked => asked,
+        };
         let (size, minimum) = match structure {
             Structure::List => list::needs(&survey, &census)?,
-            Structure::Grid => grid::needs(scene, &survey, &census)?,
-            Structure::Bvh => bvh::needs(&survey, &census)?,
+            Structure::Grid(grid) => grid::needs(scene, &survey, &census, &grid)?,
+            Structure::Bvh | Structure::Automatic => bvh::needs(&survey, &census)?,
             Structure::Wide(width) => bvh::needs_wide(&survey, &census, width)?,
         };
         let memory = Memory { size, minimum, alignment: ALIGNMENT };
@@ -192,8 +226,8 @@ impl<'s, 'a> Job<'s, 'a> {
         let how = How { effort, caller: &caller };
         let built = match self.structure {
             Structure::List => list::build(scene, survey, census, bytes),
-            Structure::Grid => grid::build(scene, survey, census, bytes),
-            Structure::Bvh => bvh::build(scene, survey, census, &how, bytes),
+            Structure::Grid(grid) => grid::build(scene, survey, census, &grid, bytes),
+            Structure::Bvh | Structure::Automatic => bvh::build(scene, survey, census, &how, bytes),
             Structure::Wide(width) => bvh::build_wide(scene, survey, census, width, &how, bytes),
         };
         caller.done(1.0).ok_or(BuildError::Cancelled)?;

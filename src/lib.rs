@@ -60,6 +60,7 @@ mod caller;
 #[cfg(feature = "capi")]
 #[allow(unsafe_code, reason = "C passes pointers, and calls by name")]
 mod capi;
+mod choice;
 mod error;
 mod exact;
 mod grid;
@@ -80,10 +81,12 @@ mod trace;
 
 pub use accel::{Accel, Info, Kind, Layout};
 pub use build::{
-    BuildOptions, Memory, PlainList, Quality, build_bvh, build_grid, bvh_needs, grid_needs,
+    BuildOptions, Memory, PlainList, Quality, build, build_bvh, build_grid, bvh_needs, grid_needs,
+    needs,
 };
 pub use caller::Threads;
 pub use error::{BuildError, OpenError, Unsupported};
+pub use grid::{GridKind, GridOptions};
 #[cfg(feature = "alloc")]
 pub use owned::OwnedAccel;
 #[cfg(feature = "parallel")]

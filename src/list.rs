@@ -1,9 +1,9 @@
 //! A plain list of leaf blocks: what a handful of primitives needs.
 
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
-use crate::block::{Census, Counts, KIND_LIST, LAYOUT_COMPACT, PartsMut};
+use crate::block::{Census, Counts, KIND_LIST, LAYOUT_COMPACT};
 use crate::error::BuildError;
-use crate::prim::{Packer, Shape, Survey, for_each_prim, geometries};
+use crate::prim::{Survey, pack_in_order};
 use crate::scene::Scene;
 
 /// Up to this many primitives no structure is faster than testing them all.
@@ -36,25 +36,6 @@ pub(crate) fn build(
     let minimum = counts.offsets().map_or(usize::MAX, |at| at.end);
     let short = BuildError::OutOfMemory { minimum };
     let parts = counts.parts_mut(bytes).ok_or(short)?;
-    counts.triangle_blocks = pack(scene, census, parts) as u32;
+    counts.triangle_blocks = pack_in_order(scene, census, parts);
     counts.seal(KIND_LIST, LAYOUT_COMPACT, census, bytes).ok_or(short)
-}
-
-/// Packs the primitives in the order of their numbers; returns the number of triangle blocks.
-fn pack(scene: &Scene, census: &Census, parts: PartsMut) -> usize {
-    geometries(scene, parts.geometries);
-    let mut packer =
-        Packer::new(parts.triangle_blocks, parts.sphere_blocks, 0, census.triangle_count);
-    let (triangle_ids, sphere_ids) = parts.prim_ids.split_at_mut(census.triangle_count as usize);
-    let (mut triangle_ids, mut sphere_ids) = (triangle_ids.iter_mut(), sphere_ids.iter_mut());
-    for_each_prim(scene, |prim| {
-        let ids = match prim.shape {
-            Shape::Triangle(_) => &mut triangle_ids,
-            Shape::Sphere { .. } => &mut sphere_ids,
-        };
-        if let (Some(id), Some(_)) = (ids.next(), packer.push(&prim.shape)) {
-            *id = prim.id;
-        }
-    });
-    packer.triangle_block_count()
 }

@@ -38,7 +38,12 @@ impl OwnedAccel {
 
     /// Builds a grid; see [`build_grid`](crate::build_grid).
     pub fn grid(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
-        Self::build(scene, options, Structure::Grid)
+        Self::build(scene, options, Structure::Grid(options.grid))
+    }
+
+    /// Builds what suits the scene; see [`build`](crate::build()).
+    pub fn automatic(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
+        Self::build(scene, options, Structure::Automatic)
     }
 
     fn build(

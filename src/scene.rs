@@ -94,6 +94,11 @@ impl<'a> Mesh<'a> {
         self.triangle_count
     }
 
+    /// The number of vertices, used or not.
+    pub fn vertex_count(&self) -> usize {
+        self.vertices.len()
+    }
+
     /// The mask; 0 is seen by every query.
     pub fn mask(&self) -> u32 {
         self.mask

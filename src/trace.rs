@@ -277,11 +277,11 @@ fn trace<S: Simd, Q: Query>(
         Bundles::Sixteen(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
         Bundles::Eight(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
         Bundles::Four(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        Bundles::None => match (block.header.kind, block.grids.first()) {
-            (KIND_BVH, _) => bvh::traverse(s, block.nodes, leaves, ray.prepare(), slab, query),
-            (KIND_GRID, Some(head)) => {
-                let (Block { words, runs, .. }, leaves) = (*block, *leaves);
-                grid::walk(s, &Cells { head, words, runs, leaves }, ray.prepare(), query)
+        Bundles::None => match block.header.kind {
+            KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray.prepare(), slab, query),
+            KIND_GRID => {
+                let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
+                grid::walk(s, &Cells { grids, words, runs, leaves }, ray.prepare(), slab, query)
             }
             _ => leaves.intersect_all(s, ray, slab, query),
         },

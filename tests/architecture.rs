@@ -24,8 +24,9 @@ const HOUSE: &[(&str, &[&str])] = &[
         "prim",
         &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
     ),
+    ("choice", &["block", "math", "prim", "scene"]),
     ("list", &["block", "error", "prim", "scene"]),
-    ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd"]),
+    ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"]),
     (
         "bvh",
         &["block", "caller", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"],
@@ -39,10 +40,19 @@ const HOUSE: &[(&str, &[&str])] = &[
     ),
     (
         "build",
-        &["accel", "block", "bvh", "caller", "error", "grid", "list", "prim", "scene", "storage"],
+        &[
+            "accel", "block", "bvh", "caller", "choice", "error", "grid", "list", "prim", "scene",
+            "storage",
+        ],
     ),
     ("owned", &["accel", "build", "caller", "error", "scene", "storage"]),
-    ("capi", &["accel", "build", "caller", "error", "query", "ray", "scene", "storage", "surface"]),
+    (
+        "capi",
+        &[
+            "accel", "build", "caller", "error", "grid", "query", "ray", "scene", "storage",
+            "surface",
+        ],
+    ),
 ];
 
 #[test]

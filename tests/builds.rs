@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use common::{bits, odd_models};
 use raykern::{
-    Accel, BuildError, BuildOptions, Layout, OwnedAccel, PlainList, Quality, Scene, Threads,
+    Accel, BuildError, BuildOptions, Kind, Layout, OwnedAccel, PlainList, Quality, Scene, Threads,
 };
 use raykern_harness::make;
 use raykern_harness::model::Model;
@@ -234,4 +234,28 @@ fn memory_of_a_cancelled_build_may_be_used_again() {
         assert_eq!(stopped, Err(BuildError::Cancelled));
         assert!(raykern::build_bvh(scene, &plain, memory).expect("enough").block() == expected);
     });
+}
+
+/// A BVH where rays are many or the scene uneven, a grid where they are few, a list for a handful.
+#[test]
+fn the_choice_follows_the_rays_and_the_scene() {
+    let surface: Model = make::blob(5_000, 1).into();
+    let handful: Model = make::plane(8).into();
+    let mut stadium = surface.clone();
+    stadium.meshes.push(make::plane(50).placed(1e3, [-5e2, -5e2, -1.0]));
+    let kind_of = |model: &Model, rays_per_prim: f32| {
+        let options = BuildOptions { rays_per_prim, ..BuildOptions::default() };
+        model.with_scene(|scene| {
+            let memory = raykern::needs(scene, &options).expect("a size");
+            let built = OwnedAccel::automatic(scene, &options).expect("a structure");
+            assert!(built.accel().block().len() <= memory.size);
+            built.accel().info().kind
+        })
+    };
+    for rays in [0.0, 1e3, f32::INFINITY, f32::NAN] {
+        assert_eq!(kind_of(&surface, rays), Kind::Bvh, "{rays}");
+    }
+    assert_eq!(kind_of(&surface, 0.1), Kind::Grid);
+    assert_eq!(kind_of(&stadium, 0.1), Kind::Bvh);
+    assert_eq!(kind_of(&handful, 0.1), Kind::List);
 }

@@ -5,7 +5,10 @@
 mod common;
 
 use common::{bits, odd_models};
-use raykern::{Accel, BuildError, BuildOptions, Layout, Memory, OpenError, PlainList, Scene};
+use raykern::{
+    Accel, BuildError, BuildOptions, GridKind, GridOptions, Kind, Layout, Memory, OpenError,
+    PlainList, Scene,
+};
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
@@ -22,29 +25,34 @@ struct Structure {
     needs: Needs,
     build: Build,
     layout: Layout,
+    grid: GridKind,
 }
 
-const STRUCTURES: [Structure; 5] = [
-    Structure {
-        name: "grid",
-        needs: raykern::grid_needs,
-        build: raykern::build_grid,
-        layout: Layout::Automatic,
-    },
+const STRUCTURES: [Structure; 7] = [
+    grid("nested grid", GridKind::Nested),
+    grid("uniform grid", GridKind::Uniform),
+    grid("octree", GridKind::Octree),
     bvh("compact", Layout::Compact),
     bvh("wide 4", Layout::Wide(4)),
     bvh("wide 8", Layout::Wide(8)),
     bvh("wide 16", Layout::Wide(16)),
 ];
 
+const fn grid(name: &'static str, grid: GridKind) -> Structure {
+    let (needs, build) = (raykern::grid_needs as Needs, raykern::build_grid as Build);
+    Structure { name, needs, build, layout: Layout::Automatic, grid }
+}
+
 const fn bvh(name: &'static str, layout: Layout) -> Structure {
-    Structure { name, needs: raykern::bvh_needs, build: raykern::build_bvh, layout }
+    let (needs, build) = (raykern::bvh_needs as Needs, raykern::build_bvh as Build);
+    Structure { name, needs, build, layout, grid: GridKind::Nested }
 }
 
 impl Structure {
     fn options(&self) -> BuildOptions<'static> {
         let (layout, plain_list) = (self.layout, PlainList::Never);
-        BuildOptions { layout, plain_list, ..BuildOptions::default() }
+        let grid = GridOptions { kind: self.grid, ..GridOptions::default() };
+        BuildOptions { layout, plain_list, grid, ..BuildOptions::default() }
     }
 
     fn needs(&self, scene: &Scene) -> Memory {
@@ -152,6 +160,58 @@ fn with_less_memory_wide_leaves_fill_up_and_then_the_layout_is_compact() {
         }
     }
     assert!(fuller > 4 && compact > 20, "{fuller} fuller, {compact} compact");
+}
+
+#[test]
+fn with_less_memory_grids_are_coarser_and_answer_the_same() {
+    let (mut coarser, mut whole) = (0, 0);
+    for (name, model) in models() {
+        let rays = RayMaker::new(&model, 1).many(Family::Random, 50);
+        for structure in STRUCTURES.into_iter().filter(|s| s.layout == Layout::Automatic) {
+            let full = structure.block(&model);
+            model.with_scene(|scene| {
+                let Memory { size, minimum, .. } = structure.needs(scene);
+                with_copy(&full, |full| {
+                    let full = Accel::open(full).expect("sound");
+                    for step in 0..=20 {
+                        let between = minimum + (size - minimum) * step / 20;
+                        with_memory(between, 0, |m| {
+                            let built = structure.build(scene, m).expect("enough");
+                            let same = built.block() == full.block();
+                            (coarser, whole) =
+                                (coarser + usize::from(!same), whole + usize::from(same));
+                            assert!(with_copy(built.block(), |m| Accel::open(m).is_ok()), "{name}");
+                            for ray in &rays {
+                                let (a, b) = (built.intersect(ray), full.intersect(ray));
+                                assert_eq!(bits(a), bits(b), "{name} {} {between}", structure.name);
+                            }
+                        });
+                    }
+                });
+            });
+        }
+    }
+    assert!(coarser > 100 && whole > 100, "{coarser} coarser, {whole} whole");
+}
+
+#[test]
+fn nested_grids_take_what_is_promised() {
+    const COUNT: usize = 20_000;
+    for (name, make) in make::ALL {
+        let model = make(COUNT);
+        let structure = STRUCTURES[0];
+        model.with_scene(|scene| {
+            let Memory { size, .. } = structure.needs(scene);
+            let prims = model.triangle_count() + model.sphere_count();
+            with_memory(size, 0, |m| {
+                let info = structure.build(scene, m).expect("enough").info();
+                assert_eq!(info.kind, Kind::Grid, "{name}");
+                assert!(info.resolution.iter().product::<u32>() > 1, "{name}: one cell");
+                assert!(size <= 122 * prims, "{name}: {} bytes", size / prims);
+                assert!(size <= 3 * info.size, "{name}: {size} for {}", info.size);
+            });
+        });
+    }
 }
 
 #[test]

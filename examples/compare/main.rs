@@ -6,9 +6,10 @@
 //! ```
 //!
 //! Renders each scene several times with each structure, on one thread, the structures taking
-//! turns, and writes pictures, tables (CSV) and a chart (SVG). Without the collected scenes it
+//! turns, and writes pictures, heat maps of steps and tests, tables (CSV) and a chart (SVG). Without the collected scenes it
 //! takes those that are built in. What does not fit the time budget is shortened, and said so.
 
+mod heat;
 mod measure;
 mod options;
 mod plan;

@@ -9,6 +9,7 @@ use raykern::{Counts, Info, OwnedAccel};
 use raykern_harness::render::{Camera, Counting, Image, Job, RenderScene, Rendering, render};
 use raykern_harness::stats::Summary;
 
+use crate::heat;
 use crate::options::{Options, Structure};
 use crate::plan::{Plan, plan, scattered};
 use crate::subjects::Subject;
@@ -129,6 +130,7 @@ pub fn scene(subject: &Subject, options: &Options, deadline: Instant) -> Result<
         notes: Vec::new(),
     };
     bench.count(&mut measured, deadline);
+    bench.heat(&mut measured, deadline, &options.out)?;
     let plan = bench.pilot(options.runs, deadline);
     bench.rounds(&plan, &mut measured, deadline, &options.out)?;
     measured.note_plan(&plan, options.runs);
@@ -167,6 +169,22 @@ impl Bench<'_> {
             result.counts = counting.counts();
             result.counted_rays = rendering.rays.total();
         }
+    }
+
+    /// Heat maps of each structure, as far as there is time.
+    fn heat(&self, measured: &mut Measured, deadline: Instant, out: &Path) -> Result<()> {
+        for (accel, result) in self.built.iter().zip(&measured.structures) {
+            self.bar.set_message(format!("heat map of {}", result.structure.name()));
+            let limit = (deadline.saturating_duration_since(Instant::now()) / 20)
+                .clamp(Duration::from_millis(500), Duration::from_secs(10));
+            match heat::maps(&accel.accel(), self.camera, Instant::now() + limit)? {
+                Some(maps) => {
+                    maps.write(out, &format!("{}_{}", measured.name, result.structure.name()))?;
+                }
+                None => measured.notes.push(format!("{}: no heat map", result.structure.name())),
+            }
+        }
+        Ok(())
     }
 
     /// Renders with each structure for a second at most, and plans by the rate.

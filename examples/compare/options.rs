@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Parser, ValueEnum};
-use raykern::{BuildError, BuildOptions, OwnedAccel, PlainList, Scene};
+use raykern::{BuildError, BuildOptions, GridKind, GridOptions, OwnedAccel, PlainList, Scene};
 
-/// Compares the grid with the BVH: build time, memory, rendering time, and why.
+/// Compares the grids with the BVH: build time, memory, rendering time, and why.
 #[derive(Debug, Parser)]
 #[command(name = "compare")]
 pub struct Options {
@@ -20,7 +20,7 @@ pub struct Options {
     #[arg(long, value_name = "WxH|FACTOR", default_value = "1")]
     pub size: Size,
     /// The structures, separated by commas
-    #[arg(long, value_enum, value_delimiter = ',', default_value = "grid,bvh")]
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "plain,grid,bvh,automatic")]
     pub structure: Vec<Structure>,
     /// The folder for pictures, tables and the chart
     #[arg(long, value_name = "DIR", default_value = "target/compare")]
@@ -40,10 +40,16 @@ pub struct Options {
 /// A structure to measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Structure {
-    /// The regular grid
+    /// The blog post's grid: uniform, the cube root of the number of triangles as cells along each axis
+    Plain,
+    /// The nested grid
     Grid,
+    /// The grid of two cells along each axis, and again two in each
+    Octree,
     /// The bounding volume hierarchy
     Bvh,
+    /// Whichever the library takes by itself
+    Automatic,
     /// No structure: every ray is tested against every leaf block
     List,
 }
@@ -52,19 +58,35 @@ impl Structure {
     /// As in tables and file names.
     pub fn name(self) -> &'static str {
         match self {
+            Structure::Plain => "plain",
             Structure::Grid => "grid",
+            Structure::Octree => "octree",
             Structure::Bvh => "bvh",
+            Structure::Automatic => "auto",
             Structure::List => "list",
         }
     }
 
     /// Builds it over `scene`, however small that is.
     pub fn build(self, scene: &Scene) -> Result<OwnedAccel, BuildError> {
-        let plain_list = if self == Structure::List { PlainList::Always } else { PlainList::Never };
-        let options = BuildOptions { plain_list, ..Default::default() };
+        let plain_list = match self {
+            Structure::List => PlainList::Always,
+            Structure::Automatic => PlainList::Automatic,
+            _ => PlainList::Never,
+        };
+        let kind = match self {
+            Structure::Plain => GridKind::Uniform,
+            Structure::Octree => GridKind::Octree,
+            _ => GridKind::Nested,
+        };
+        let grid = GridOptions { kind, ..Default::default() };
+        let options = BuildOptions { plain_list, grid, ..Default::default() };
         match self {
-            Structure::Grid => OwnedAccel::grid(scene, &options),
+            Structure::Plain | Structure::Grid | Structure::Octree => {
+                OwnedAccel::grid(scene, &options)
+            }
             Structure::Bvh | Structure::List => OwnedAccel::bvh(scene, &options),
+            Structure::Automatic => OwnedAccel::automatic(scene, &options),
         }
     }
 }

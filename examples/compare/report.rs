@@ -54,7 +54,7 @@ impl Report {
         self.print_all();
         self.chart().write(&self.folder.join("times.svg")).map_err(|e| anyhow!(e))?;
         println!(
-            "\n{:.0} s in all. Pictures, summary.csv, runs.csv and times.svg are in {}.",
+            "\n{:.0} s in all. Pictures, heat maps, summary.csv, runs.csv and times.svg are in {}.",
             elapsed.as_secs_f64(),
             self.folder.display()
         );
@@ -62,17 +62,27 @@ impl Report {
     }
 
     fn print_all(&self) {
-        let has = |s| self.scenes.iter().any(|scene| scene.result(s).is_some());
-        if !(has(Structure::Grid) && has(Structure::Bvh)) {
-            return;
-        }
-        println!("{:20} {:>24} {:>24}   grid / bvh (95 %)", "scene", "grid, s", "bvh, s");
+        let kinds = self.kinds();
+        let heads: Vec<_> =
+            kinds.iter().map(|s| format!("{:>22}", format!("{}, s", s.name()))).collect();
+        println!("{:20} {}   grid / bvh (95 %)", "scene", heads.join(" "));
         for scene in &self.scenes {
-            let cell = |s| scene.result(s).map(|r| scene.mean(r)).unwrap_or_default();
+            let cell = |s: &Structure| scene.result(*s).map(|r| scene.mean(r)).unwrap_or_default();
+            let cells: Vec<_> = kinds.iter().map(|s| format!("{:>22}", cell(s))).collect();
             let ratio = scene.ratio(Structure::Grid).map(ratio_text).unwrap_or_default();
-            let (grid, bvh) = (cell(Structure::Grid), cell(Structure::Bvh));
-            println!("{:20} {grid:>24} {bvh:>24}   {ratio}", scene.name);
+            println!("{:20} {}   {ratio}", scene.name, cells.join(" "));
         }
+    }
+
+    /// The structures that were measured, in the order in which they were.
+    fn kinds(&self) -> Vec<Structure> {
+        let mut kinds = Vec::new();
+        for result in self.scenes.iter().flat_map(|scene| &scene.structures) {
+            if !kinds.contains(&result.structure) {
+                kinds.push(result.structure);
+            }
+        }
+        kinds
     }
 
     fn write_tables(&self) -> Result<()> {
@@ -129,12 +139,6 @@ impl Report {
     }
 
     fn chart(&self) -> Chart {
-        let mut kinds: Vec<Structure> = Vec::new();
-        for result in self.scenes.iter().flat_map(|scene| &scene.structures) {
-            if !kinds.contains(&result.structure) {
-                kinds.push(result.structure);
-            }
-        }
         let values = |s| {
             self.scenes.iter().map(|c| c.result(s).and_then(MeasuredStructure::summary)).collect()
         };
@@ -145,8 +149,7 @@ impl Report {
                 .into(),
             axis: "seconds for one picture on one thread (logarithmic)".into(),
             rows: self.scenes.iter().map(Measured::label).collect(),
-            series: kinds
-                .into_iter()
+            series: (self.kinds().into_iter())
                 .map(|s| Series { name: s.name().into(), values: values(s) })
                 .collect(),
         }

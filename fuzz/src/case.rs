@@ -5,8 +5,8 @@
 use std::fmt;
 
 use raykern::{
-    Accel, BuildOptions, Counts, Hit, Mesh, NONE, OwnedAccel, PlainList, Precision, QueryOptions,
-    Ray, Scene, SphereSet, build_grid, grid_needs,
+    Accel, BuildOptions, Counts, GridKind, GridOptions, Hit, Mesh, NONE, OwnedAccel, PlainList,
+    Precision, QueryOptions, Ray, Scene, SphereSet, build_grid, grid_needs,
 };
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::oracle::{Judgement, Oracle};
@@ -54,16 +54,22 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// Builds list, grid and BVH, each forced, and a grid in the least memory.
+    /// Builds list, grids and BVH, each forced, and a grid in the least memory.
     pub fn build(model: &Model, masks: &[u32]) -> Self {
         let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
         let (always, never) = (with(PlainList::Always), with(PlainList::Never));
         let copy = |accel: Accel| Bytes::copy(accel.block());
         let owned = |built: OwnedAccel| copy(built.accel());
         let blocks = with_scene(model, masks, |scene| {
+            let grid = |kind| {
+                let grid = GridOptions { kind, ..GridOptions::default() };
+                OwnedAccel::grid(scene, &BuildOptions { grid, ..never })
+            };
             vec![
                 ("list", owned(OwnedAccel::bvh(scene, &always).expect("a list"))),
-                ("grid", owned(OwnedAccel::grid(scene, &never).expect("a grid"))),
+                ("nested grid", owned(grid(GridKind::Nested).expect("a grid"))),
+                ("uniform grid", owned(grid(GridKind::Uniform).expect("a grid"))),
+                ("octree", owned(grid(GridKind::Octree).expect("a grid"))),
                 ("bvh", owned(OwnedAccel::bvh(scene, &never).expect("a BVH"))),
                 (
                     "automatic",

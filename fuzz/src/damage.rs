@@ -4,7 +4,10 @@
 
 use std::fmt;
 
-use raykern::{Accel, BuildOptions, Facing, Hit, NONE, OwnedAccel, PlainList, Precision, PrimId};
+use raykern::{
+    Accel, BuildOptions, Facing, GridKind, GridOptions, Hit, NONE, OwnedAccel, PlainList,
+    Precision, PrimId,
+};
 use raykern::{QueryOptions, Ray};
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
@@ -39,9 +42,11 @@ pub fn originals() -> Vec<Vec<u8>> {
     let build = |model: &Model| {
         model.with_scene(|scene| {
             let never = with(PlainList::Never);
+            let octree = GridOptions { kind: GridKind::Octree, ..GridOptions::default() };
             [
                 OwnedAccel::bvh(scene, &with(PlainList::Always)),
                 OwnedAccel::grid(scene, &never),
+                OwnedAccel::grid(scene, &BuildOptions { grid: octree, ..never }),
                 OwnedAccel::bvh(scene, &never),
             ]
             .map(|built| built.expect("a structure").accel().block().to_vec())

@@ -1,39 +1,55 @@
-//! The cells of a grid.
+//! The cells of grids, and grids within cells.
 //!
 //! ```text
-//! words[cell]        what is in the cell: nothing, or the first entry of its run
-//! runs[first ..]     the lanes of leaf blocks in the cell, the last entry marked
+//! grids                the grids that hold everything, each over a box of its own
+//! words                grid after grid: its resolution, then a word for each cell, x fastest
+//! runs[first ..]       the lanes of leaf blocks in a cell, the last entry marked
 //! ```
 //!
-//! A word has two bits of tag and thirty bits of meaning. Tag 0 is an empty cell, tag 1 a run; tag 2
-//! is kept for sub-grids, and the thirty bits of an empty cell for distances to what is not empty.
-//! This is the offsets-and-entries form of a compressed sparse row, with the end of a row marked in
-//! its last entry instead of taken from the next row's offset.
+//! A cell's word has two bits of tag and thirty bits of meaning:
+//!
+//! ```text
+//! bit 31 30 29                        0
+//!     | 0  0 | the empty cubes ahead   |    nothing is in the cell
+//!     | 0  1 | first entry of its run  |
+//!     | 1  0 | first word of its grid  |    the cell is divided once more
+//! ```
+//!
+//! An empty cell says, for each octant of directions, how large a cube of empty cells it is the corner of: three
+//! bits an octant, the number of a side in [`SIDES`]. This is the offsets-and-entries form of a compressed sparse row, with
+//! the end of a row marked in its last entry instead of taken from the next row's offset.
+//!
+//! The grids of `grids` come first, then the grids in their cells, then those in the cells of these, each
+//! in the order of the words that name them.
 
 #![allow(unsafe_code, reason = "promises about the layouts drawn here")]
 
 use super::leaf::LeafRef;
 use crate::storage::Plain;
 
-/// Where the cells lie: cell `(i, j, k)` is word `first_word + i + nx * (j + ny * k)`.
+/// Where a grid that is in no other lies: cell `(i, j, k)` spans the points `p` with `i <= (p - lower) * per_length <= i + 1`
+/// in x, and likewise in y and z.
 ///
 /// ```text
-/// byte 0       24     48           60           64
-///      | lower | cell | resolution | first word |
+/// byte 0       24           48       52           56         64
+///      | lower | per length | finest | first word | reserved |
 /// ```
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct GridHead {
     /// The corner of cell (0, 0, 0).
     pub lower: [f64; 3],
-    /// The edges of a cell.
-    pub cell: [f64; 3],
-    pub resolution: [u32; 3],
+    /// How many cells there are to a unit of length.
+    pub per_length: [f64; 3],
+    /// Along no axis is a cell divided into more than this many, grids in its grid included.
+    pub finest: u32,
+    /// The word of its resolution.
     pub first_word: u32,
+    pub reserved: [u32; 2],
 }
 const _: () = assert!(size_of::<GridHead>() == 64);
 
-// SAFETY: numbers only; 24 + 24 + 12 + 4 = 64, so no padding.
+// SAFETY: numbers only; 24 + 24 + 4 + 4 + 8 = 64, so no padding.
 unsafe impl Plain for GridHead {}
 
 /// One entry of a cell's run.
@@ -59,28 +75,109 @@ unsafe impl Plain for Run {}
 /// Marks the last entry of a run.
 pub(crate) const LAST: u32 = 1 << 31;
 const TAG_RUN: u32 = 1 << 30;
-/// The highest entry at which a run can start.
+const TAG_GRID: u32 = 2 << 30;
+/// The highest entry at which a run can start, and the highest word at which a grid can.
 pub(crate) const VALUE: u32 = TAG_RUN - 1;
 
-/// The word of an empty cell.
+/// The word of an empty cell beside which nothing is known to be empty.
 pub(crate) const EMPTY: u32 = 0;
+
+/// Grids lie in grids this deep at most, the outermost counted.
+pub(crate) const MOST_DEPTH: usize = 8;
+
+/// The most cells along an axis of one grid.
+pub(crate) const MOST_CELLS: u32 = 1023;
+
+/// The sides of empty cubes that a word can name, in cells.
+pub(crate) const SIDES: [u8; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
+
+/// What a cell's word says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cell {
+    Empty,
+    /// The entry at which its run starts.
+    Run(usize),
+    /// The word of its grid's resolution.
+    Grid(usize),
+    /// Nothing that a build writes.
+    Unknown,
+}
+
+/// The meaning of a cell's word.
+#[inline(always)]
+pub(crate) fn cell(word: u32) -> Cell {
+    let value = (word & VALUE) as usize;
+    match word & !VALUE {
+        0 => Cell::Empty,
+        TAG_RUN => Cell::Run(value),
+        TAG_GRID => Cell::Grid(value),
+        _ => Cell::Unknown,
+    }
+}
 
 /// The word of a cell whose run starts at entry `first`.
 pub(crate) fn run_word(first: u32) -> u32 {
     TAG_RUN | first
 }
 
-/// The entry at which the cell's run starts, unless it is empty.
-pub(crate) fn run_start(word: u32) -> Option<usize> {
-    (word & !VALUE == TAG_RUN).then_some((word & VALUE) as usize)
+/// The word of a cell whose grid starts at word `first`.
+pub(crate) fn grid_word(first: u32) -> u32 {
+    TAG_GRID | first
+}
+
+/// Of an empty cell's word, the side of the empty cube towards an octant as its number in [`SIDES`]; bit `k` of
+/// the octant says that coordinate `k` falls.
+#[inline(always)]
+pub(crate) fn side_ahead(word: u32, octant: u32) -> usize {
+    (word >> (3 * octant) & 7) as usize
+}
+
+/// The word of a grid's resolution.
+///
+/// ```text
+/// bit 31 30 29     20 19     10 9       0
+///     | 0  0 |   nz   |   ny   |   nx   |
+/// ```
+pub(crate) fn resolution_word([x, y, z]: [u32; 3]) -> u32 {
+    x | y << 10 | z << 20
+}
+
+/// The cells along each axis by that word.
+#[inline(always)]
+pub(crate) fn resolution(word: u32) -> [u32; 3] {
+    [word & MOST_CELLS, word >> 10 & MOST_CELLS, word >> 20 & MOST_CELLS]
+}
+
+/// The number of cells of a grid.
+pub(crate) fn cell_count(resolution: [u32; 3]) -> u64 {
+    resolution.iter().map(|n| u64::from(*n)).product()
 }
 
 impl Run {
+    #[inline(always)]
     pub fn leaf(self) -> LeafRef {
         LeafRef { block: self.block, lanes: self.lanes & 0xFFFF }
     }
 
+    #[inline(always)]
     pub fn is_last(self) -> bool {
         self.lanes & LAST != 0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_keep_what_they_say() {
+        assert_eq!(cell(EMPTY), Cell::Empty);
+        assert_eq!(cell(run_word(VALUE)), Cell::Run(VALUE as usize));
+        assert_eq!(cell(grid_word(7)), Cell::Grid(7));
+        assert_eq!(cell(u32::MAX), Cell::Unknown);
+        assert_eq!(resolution(resolution_word([1023, 1, 512])), [1023, 1, 512]);
+        let word = 5 << 21 | 3;
+        assert_eq!([0, 1, 7].map(|octant| side_ahead(word, octant)), [3, 0, 5]);
+        assert_eq!(cell(word), Cell::Empty);
     }
 }

@@ -47,6 +47,21 @@ pub unsafe extern "C" fn rt_grid_needs(
     guard(|| unsafe { needs(scene, options, out, grid_needs) })
 }
 
+/// Writes to `*out` the memory that `rt_build` needs for `scene`. `options` may be null.
+///
+/// # Safety
+///
+/// Every pointer is null or valid, as are the scene's; nobody else uses `*out` during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rt_needs(
+    scene: *const RtScene,
+    options: *const RtBuildOptions,
+    out: *mut RtMemory,
+) -> RtStatus {
+    // SAFETY: the caller's promise.
+    guard(|| unsafe { needs(scene, options, out, crate::build::needs) })
+}
+
 /// Builds a bounding volume hierarchy over `scene` in `memory`, which has `size` bytes and starts at
 /// a multiple of 64. `options` may be null.
 ///
@@ -72,7 +87,26 @@ pub unsafe extern "C" fn rt_build_bvh(
     guard(|| unsafe { build(scene, options, memory.cast(), size, out, build_bvh) })
 }
 
-/// Builds a regular grid: all else as `rt_build_bvh`.
+/// Builds what is likely to take the least time, building it and tracing `options->rays_per_prim` rays for each primitive: a
+/// list, a grid or a BVH; `rt_accel_info` says which it is. All else as `rt_build_bvh`.
+///
+/// # Safety
+///
+/// As for `rt_build_bvh`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rt_build(
+    scene: *const RtScene,
+    options: *const RtBuildOptions,
+    memory: *mut core::ffi::c_void,
+    size: usize,
+    out: *mut *const RtAccel,
+) -> RtStatus {
+    // SAFETY: the caller's promise.
+    guard(|| unsafe { build(scene, options, memory.cast(), size, out, crate::build::build) })
+}
+
+/// Builds a grid, of the kind that the options name: all else as `rt_build_bvh`. With less memory it is coarser, in the last
+/// resort one cell.
 ///
 /// # Safety
 ///

@@ -5,14 +5,16 @@ use core::ffi::c_void;
 use super::control;
 use super::status::Error;
 use super::types::{
-    RT_LAYOUT_AUTOMATIC, RT_LAYOUT_COMPACT, RT_LAYOUT_WIDE_4, RT_LAYOUT_WIDE_8, RT_LAYOUT_WIDE_16,
-    RT_PLAIN_LIST_ALWAYS, RT_PLAIN_LIST_AUTOMATIC, RT_PLAIN_LIST_NEVER, RT_QUALITY_BALANCED,
-    RT_QUALITY_BEST, RT_QUALITY_FAST, RtBuildOptions,
+    RT_GRID_NESTED, RT_GRID_OCTREE, RT_GRID_UNIFORM, RT_LAYOUT_AUTOMATIC, RT_LAYOUT_COMPACT,
+    RT_LAYOUT_WIDE_4, RT_LAYOUT_WIDE_8, RT_LAYOUT_WIDE_16, RT_PLAIN_LIST_ALWAYS,
+    RT_PLAIN_LIST_AUTOMATIC, RT_PLAIN_LIST_NEVER, RT_QUALITY_BALANCED, RT_QUALITY_BEST,
+    RT_QUALITY_FAST, RtBuildOptions,
 };
 use super::versioned;
 use crate::accel::Layout;
 use crate::build::{BuildOptions, PlainList, Quality};
 use crate::caller::Threads;
+use crate::grid::{GridKind, GridOptions};
 
 /// A C caller during a build.
 pub(super) struct Lender(Option<RtBuildOptions>);
@@ -76,8 +78,38 @@ impl Lender {
         };
         let threads: Option<&dyn Threads> =
             if raw.parallel_for.is_some() { Some(self) } else { None };
-        Ok(BuildOptions { quality, layout, refit, plain_list, threads, progress: Some(progress) })
+        let (grid, rays_per_prim) = (grid_options(raw)?, raw.rays_per_prim);
+        // Written so that a NaN is refused.
+        if !(rays_per_prim >= 0.0) {
+            return Err(Error::InvalidArgument);
+        }
+        let progress = Some(progress);
+        Ok(BuildOptions {
+            quality,
+            layout,
+            refit,
+            plain_list,
+            grid,
+            rays_per_prim,
+            threads,
+            progress,
+        })
     }
+}
+
+/// What the options say of grids.
+fn grid_options(raw: &RtBuildOptions) -> Result<GridOptions, Error> {
+    let kind = match raw.grid_kind {
+        RT_GRID_NESTED => GridKind::Nested,
+        RT_GRID_UNIFORM => GridKind::Uniform,
+        RT_GRID_OCTREE => GridKind::Octree,
+        _ => return Err(Error::InvalidArgument),
+    };
+    // Written so that a NaN is refused.
+    if !(raw.grid_density >= 0.0) {
+        return Err(Error::InvalidArgument);
+    }
+    Ok(GridOptions { kind, density: raw.grid_density, depth: raw.grid_depth })
 }
 
 /// What a task is, as `context` points to it.

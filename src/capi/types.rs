@@ -31,6 +31,13 @@ pub const RT_PLAIN_LIST_NEVER: u32 = 1;
 /// Test every ray against every leaf block.
 pub const RT_PLAIN_LIST_ALWAYS: u32 = 2;
 
+/// `RtBuildOptions.grid_kind`: a coarse grid whose full cells hold finer ones.
+pub const RT_GRID_NESTED: u32 = 0;
+/// Cells of one size.
+pub const RT_GRID_UNIFORM: u32 = 1;
+/// Two cells along each axis, and again two in each that is full.
+pub const RT_GRID_OCTREE: u32 = 2;
+
 /// `RtQuery.precision`: hit or miss, which primitive and which order as in real arithmetic; the
 /// same answer from every structure; `t` is the nearest float.
 pub const RT_PRECISION_EXACT: u32 = 0;
@@ -195,6 +202,15 @@ pub struct RtBuildOptions {
     pub parallel_for: RtParallelFor,
     /// Or null.
     pub progress: RtProgress,
+    /// One of `RT_GRID_`, for a grid.
+    pub grid_kind: u32,
+    /// Cells for each primitive, of the outermost grid if they are nested, at most 64; not negative. 0: for a uniform grid the cube
+    /// root of the number of primitives along each axis, otherwise a fiftieth.
+    pub grid_density: f32,
+    /// How deep grids may be nested, the outermost counted, up to 8; 0: 8.
+    pub grid_depth: u32,
+    /// For `rt_build`, how many rays for each primitive will be traced before the next build; not negative. 0: many.
+    pub rays_per_prim: f32,
 }
 
 /// What a query leaves out. Zero in every field but the first leaves out nothing.
@@ -284,7 +300,8 @@ pub struct RtInfo {
 /// RtSphereSet     0 spheres | P sphere_count .. reserved | P + 16
 /// RtInstance      0 accel | P object_to_world | P + 48 mask reserved | P + 56
 /// RtScene         0 struct_size .. reserved | 32 meshes sphere_sets instances | 32 + 3P
-/// RtBuildOptions  0 struct_size .. worker_count | 24 user parallel_for progress | 24 + 3P
+/// RtBuildOptions  0 struct_size .. worker_count | 24 user parallel_for progress | 24 + 3P grid_kind .. rays_per_prim |
+///                 40 + 3P
 /// RtInfo          0 struct_size kind layout | 12 lower upper | 36 counts | 52 resolution |
 ///                 64 size structure_size leaf_size id_size | 64 + 4P
 /// ```
@@ -293,7 +310,7 @@ const _: () = {
     assert!(size_of::<RtRay>() == 32 && size_of::<RtHit>() == 24);
     assert!(size_of::<RtMesh>() == 2 * P + 24 && size_of::<RtSphereSet>() == P + 16);
     assert!(size_of::<RtInstance>() == P + 56 && size_of::<RtScene>() == 3 * P + 32);
-    assert!(size_of::<RtBuildOptions>() == 3 * P + 24 && size_of::<RtQuery>() == 32);
+    assert!(size_of::<RtBuildOptions>() == 3 * P + 40 && size_of::<RtQuery>() == 32);
     assert!(size_of::<RtMemory>() == 3 * P && size_of::<RtSurface>() == 56);
     assert!(size_of::<RtInfo>() == 4 * P + 64);
     assert!(core::mem::offset_of!(RtScene, meshes) == 32);
@@ -312,7 +329,10 @@ unsafe impl Growing for RtInstance {}
 // SAFETY: as above.
 unsafe impl Growing for RtScene {}
 // SAFETY: as above.
-unsafe impl Growing for RtBuildOptions {}
+unsafe impl Growing for RtBuildOptions {
+    /// Up to `progress`.
+    const FIRST_SIZE: usize = 24 + 3 * size_of::<usize>();
+}
 // SAFETY: as above.
 unsafe impl Growing for RtQuery {}
 // SAFETY: as above.

@@ -1,21 +1,24 @@
-//! The bounds of grid steps: a search for what breaks them, and how much of them is used.
+//! The bounds of grid steps and of insertion: a search for what breaks them, and how much of them is used.
 
 use std::println;
+use std::vec::Vec;
 
 use raykern_harness::make::Random;
 use raykern_harness::oracle::dyadic::Dyadic;
 use raykern_harness::search::{Worst, samples};
 
-use super::DILATION;
-use super::cells::CellRay;
-use super::steps::{Real, Steps};
-use crate::block::cells::GridHead;
-use crate::math::rounding::UNIT;
+use super::overlap::cells_near;
+use super::ray::CellRay;
+use super::space::Space;
+use super::steps::{Level, Part};
+use super::{FINEST, dilation};
 use crate::math::{Aabb, wide};
-use crate::ray::{Interval, PreparedRay, Ray, WideSlab};
+use crate::prim::Shape;
+use crate::ray::{PreparedRay, Ray};
+use crate::simd::Scalar;
 
-/// A grid over a box that may be flat, far from zero, or both.
-fn grid(random: &mut Random) -> (GridHead, Aabb) {
+/// A box that may be flat, far from zero, or both.
+fn bounds(random: &mut Random) -> Aabb {
     let size = 2f32.powi(random.below(100) as i32 - 80);
     let mut aabb = Aabb::EMPTY;
     for k in 0..3 {
@@ -26,9 +29,24 @@ fn grid(random: &mut Random) -> (GridHead, Aabb) {
     }
     // A triangle has area, and the box of a sphere is rounded outwards.
     if (0..3).filter(|k| aabb.lower[*k] < aabb.upper[*k]).count() < 2 {
-        return grid(random);
+        return bounds(random);
     }
-    (GridHead::new(&aabb, 1 + random.below(300) as u32), aabb)
+    aabb
+}
+
+/// Resolutions of a grid and of those in it.
+fn resolutions(random: &mut Random) -> Vec<[u32; 3]> {
+    let mut all = std::vec![[0; 3].map(|_| 1 + random.below(300) as u32)];
+    let mut finest = all[0];
+    for _ in 0..random.below(5) {
+        let inner = [0; 3].map(|_| 1 + random.below(12) as u32);
+        finest = [0, 1, 2].map(|k| finest[k] * inner[k]);
+        if finest.iter().any(|n| *n > FINEST) {
+            break;
+        }
+        all.push(inner);
+    }
+    all
 }
 
 fn point_in(random: &mut Random, aabb: &Aabb) -> [f32; 3] {
@@ -39,11 +57,11 @@ fn point_in(random: &mut Random, aabb: &Aabb) -> [f32; 3] {
     })
 }
 
-/// From within `distance` grids to a point of the box.
-fn ray_to(random: &mut Random, aabb: &Aabb, distance: i32) -> Option<PreparedRay> {
+/// From within 2^30 grids to a point of the box.
+fn ray_to(random: &mut Random, aabb: &Aabb) -> Option<PreparedRay> {
     let (from, to) = (point_in(random, aabb), point_in(random, aabb));
     let size = (wide(aabb.upper) - wide(aabb.lower)).max_element();
-    let away = 2f64.powi(random.below(distance as usize + 10) as i32 - 9);
+    let away = 2f64.powi(random.below(40) as i32 - 9);
     let away = if random.below(4) == 0 { 0.0 } else { away * size };
     let turn = random.direction();
     let origin = [0, 1, 2].map(|k| (f64::from(from[k]) + turn[k] * away) as f32);
@@ -55,124 +73,189 @@ fn ray_to(random: &mut Random, aabb: &Aabb, distance: i32) -> Option<PreparedRay
     Ray::new(origin, direction).prepare(aabb.reach())
 }
 
-/// `(o + t d' - lower - wall * cell) / cell`, without error: how far the ray is from a wall at `t`.
-fn beyond_wall(head: &GridHead, ray: &PreparedRay, k: usize, t: f64, wall: u32) -> f64 {
-    let [o, d] = [ray.given.origin[k], ray.given.direction[k]].map(Dyadic::from_f32);
-    let step = &d * &Dyadic::from_f64(t / ray.t_scale);
-    let cell = Dyadic::from_f64(head.cell[k]);
-    let wall = &Dyadic::from_f64(f64::from(wall)) * &cell;
-    let at = &(&o + &step) - &(&Dyadic::from_f64(head.lower[k]) + &wall);
-    at.ratio(&cell)
+/// A ray without error in the cells of a grid, turned as the walk turns it.
+struct RealRay {
+    origin: [Dyadic; 3],
+    direction: [Dyadic; 3],
 }
 
-/// A walk to its end: where the ray really is when it starts and whenever it changes cells.
-fn see_walk<F: Real + Into<f64>>(
-    random: &mut Random,
-    head: &GridHead,
-    ray: &PreparedRay,
-    start: &mut Worst,
-    wall: &mut Worst,
-) -> bool {
-    let cell_ray = CellRay::new(head, ray);
-    let (lower, upper) = head.corners();
-    let part = WideSlab::new(ray).clip(lower, upper, f64::from(ray.t_max));
-    if !cell_ray.steps_safely::<F>() || part.is_empty() {
-        return true;
+impl RealRay {
+    fn new(space: &Space, ray: &PreparedRay, cell_ray: &CellRay) -> Self {
+        let head = space.head(0, 1);
+        let in_cells = |k: usize, x: Dyadic| &x * &Dyadic::from_f64(head.per_length[k]);
+        let origin = [0, 1, 2].map(|k| {
+            let o = Dyadic::from_f32(ray.given.origin[k]);
+            let o = in_cells(k, &o - &Dyadic::from_f64(head.lower[k]));
+            let n = Dyadic::from_f64(f64::from(space.resolution[k]));
+            if cell_ray.turned[k] == 0 { o } else { &n - &o }
+        });
+        let direction = [0, 1, 2].map(|k| {
+            let d = in_cells(k, Dyadic::from_f32(ray.given.direction[k]));
+            if cell_ray.turned[k] == 0 { d } else { -d }
+        });
+        RealRay { origin, direction }
     }
-    let granted = 6.0 * F::UNIT * cell_ray.extent();
-    let mut broken = false;
-    for _ in 0..8 {
-        // Starts where the ray passes a wall: only there can the cell be another one.
-        let k = random.below(3);
-        let wall = random.below(head.resolution[k] as usize + 1) as f64;
-        let t = (wall - cell_ray.origin[k]) / cell_ray.direction[k];
-        let t = t * (1.0 + F::UNIT * random.between(-2.0, 2.0));
-        if !(part.near <= t && t <= part.far) {
-            continue;
+
+    /// In the cells of a grid in a cell.
+    fn within(&self, cell: [f32; 3], resolution: [u32; 3]) -> Self {
+        let n = resolution.map(|n| Dyadic::from_f64(f64::from(n)));
+        let scaled = |k: usize, x: &Dyadic| x * &n[k];
+        RealRay {
+            origin: [0, 1, 2].map(|k| scaled(k, &(&self.origin[k] - &Dyadic::from_f32(cell[k])))),
+            direction: [0, 1, 2].map(|k| scaled(k, &self.direction[k])),
         }
-        let steps = Steps::<F>::new(&cell_ray, Interval { near: t, ..part });
-        let at = beyond_wall(head, ray, k, t, 0);
-        let cell = f64::from(steps.cell[k]);
-        let inside = at.max(0.0).min(f64::from(head.resolution[k]));
-        broken |= start.see((cell - inside).max(inside - cell - 1.0).max(0.0), granted);
     }
-    let mut steps = Steps::<F>::new(&cell_ray, part);
-    loop {
-        let (cell, t) = (steps.cell, steps.t_next);
-        let going = steps.advance(F::INFINITY);
-        let Some(k) = (0..3).find(|k| steps.cell[*k] != cell[*k]).filter(|_| going) else {
-            return !broken;
-        };
-        let passed = cell[k].max(steps.cell[k]);
-        broken |= wall.see(beyond_wall(head, ray, k, t[k].into(), passed), granted);
+
+    /// How far it is outside of a cell at a given `t`.
+    fn outside(&self, k: usize, t: &Dyadic, cell: f32) -> f64 {
+        let at = &self.origin[k] + &(t * &self.direction[k]);
+        let one = Dyadic::from_f64(1.0);
+        (&at - &Dyadic::from_f32(cell))
+            .ratio(&one)
+            .min(0.0)
+            .abs()
+            .max((&at - &Dyadic::from_f32(cell + 1.0)).ratio(&one).max(0.0))
     }
 }
 
-fn walks<F: Real + Into<f64>>(seed: u64, distance: i32, names: [&'static str; 2], least: f64) {
-    println!("seed {seed}");
-    let mut random = Random::new(seed);
-    let [mut start, mut wall] = names.map(Worst::new);
+/// A walk through grids in grids, here and there by a jump.
+struct Walker<'r> {
+    random: &'r mut Random,
+    cell_ray: CellRay,
+    t_scale: f64,
+    resolutions: Vec<[u32; 3]>,
+}
+
+impl Walker<'_> {
+    /// Walks through a grid and some of those in its cells; whether a bound was broken.
+    fn walk(
+        &mut self,
+        depth: usize,
+        mut level: Level<[f32; 4]>,
+        real: &RealRay,
+        worst: &mut Worst,
+    ) -> bool {
+        let mut broken = false;
+        for _ in 0..24 {
+            let seen = level.seen(Scalar);
+            let cell = seen.cell;
+            for k in 0..3 {
+                let along = self.resolutions[..=depth].iter().map(|n| f64::from(n[k])).product();
+                for t in seen.times {
+                    // Both the start and what is counted from it are exact.
+                    let t = &Dyadic::from_f64(t[0] / self.t_scale)
+                        + &Dyadic::from_f64(t[1] / self.t_scale);
+                    broken |= worst.see(real.outside(k, &t, cell[k]), dilation(along));
+                }
+            }
+            if broken {
+                println!("{seen:?} at depth {depth}");
+                return true;
+            }
+            if let Some(inner) =
+                self.resolutions.get(depth + 1).copied().filter(|_| self.random.below(3) == 0)
+            {
+                let deeper = level.inner(Scalar, (0, inner), self.cell_ray.turned, f32::INFINITY);
+                if self.walk(depth + 1, deeper, &real.within(cell, inner), worst) {
+                    return true;
+                }
+            }
+            let side = [1, 1, 2, 5][self.random.below(4)];
+            if !(if side == 1 { level.step(Scalar) } else { level.jump(Scalar, side) }) {
+                break;
+            }
+        }
+        false
+    }
+}
+
+/// Where a walk says that the ray is in a cell, from entering it to leaving it, the ray really is within the dilation of it.
+#[test]
+fn steps() {
+    const SEED: u64 = 41;
+    println!("seed {SEED}");
+    let mut random = Random::new(SEED);
+    let mut worst = Worst::new("grid: cell of a ray");
     for sample in 0..samples(4_000) {
         let before = random.clone();
-        let (head, aabb) = grid(&mut random);
-        let Some(ray) = ray_to(&mut random, &aabb, distance) else { continue };
-        let right = see_walk::<F>(&mut random, &head, &ray, &mut start, &mut wall);
-        assert!(right, "sample {sample} of seed {seed}: {before:?}");
+        let (aabb, mut resolutions) = (bounds(&mut random), resolutions(&mut random));
+        let space = Space::over(&aabb, resolutions[0]);
+        resolutions[0] = space.resolution;
+        let Some(ray) = ray_to(&mut random, &aabb) else { continue };
+        let parts = resolutions[1..].iter().fold([1; 3], |all, n| [0, 1, 2].map(|k| all[k] * n[k]));
+        let finest = parts.into_iter().max().unwrap_or(1);
+        let cell_ray = CellRay::new(&space.head(0, finest), space.resolution, &ray);
+        let [enter, exit] = cell_ray.times();
+        if !cell_ray.is_near(finest) || enter.max(0.0) > exit {
+            continue;
+        }
+        let part = Part { start: enter.max(0.0), exit };
+        let level = Level::outermost(Scalar, &cell_ray, 0, part, f32::INFINITY);
+        let real = RealRay::new(&space, &ray, &cell_ray);
+        let mut walker =
+            Walker { random: &mut random, cell_ray, t_scale: ray.t_scale, resolutions };
+        let broken = walker.walk(0, level, &real, &mut worst);
+        assert!(!broken, "sample {sample} of seed {SEED}: {before:?}");
     }
-    start.assert_tight(least);
-    wall.assert_tight(least);
+    worst.assert_tight(0.02);
 }
 
-#[test]
-fn steps_in_f32() {
-    walks::<f32>(41, 8, ["grid, f32: start", "grid, f32: wall"], 0.1);
-}
-
-#[test]
-fn steps_in_f64() {
-    walks::<f64>(42, 30, ["grid, f64: start", "grid, f64: wall"], 0.1);
-}
-
-/// A primitive is listed in the cells of its box and, on either side, within the dilation less what
-/// rounding takes: a quarter of it is left to that.
+/// Every point of a triangle is within three quarters of the dilation of a cell that lists the triangle, whichever of the
+/// cells around it that is.
 #[test]
 fn insertion() {
     const SEED: u64 = 43;
     println!("seed {SEED}");
     let mut random = Random::new(SEED);
-    let mut worst = Worst::new("grid: cell of a box");
-    for _ in 0..samples(100_000) {
-        let (head, aabb) = grid(&mut random);
-        let point = point_in(&mut random, &aabb);
-        let cells = head.cells_of(&Aabb { lower: point, upper: point });
-        for k in 0..3 {
-            let at = &Dyadic::from_f32(point[k]) - &Dyadic::from_f64(head.lower[k]);
-            let at = at.ratio(&Dyadic::from_f64(head.cell[k]));
-            let last = f64::from(head.resolution[k] - 1);
-            let [first, end] = cells[k].map(f64::from);
-            let off = (first.min(last) - (at - DILATION)).max(at + DILATION - end - 1.0);
-            // At the ends of the grid the margin takes the place of the dilation.
-            let off = if at + DILATION > last + 1.0 { first - (at - DILATION) } else { off };
-            worst.see(off.max(0.0), DILATION / 4.0);
+    let (mut points, mut left_out) = (0, 0);
+    for _ in 0..samples(3_000) {
+        let aabb = bounds(&mut random);
+        let n = [0; 3].map(|_| 1 + random.below(40) as u32);
+        let mut space = Space::over(&aabb, n);
+        if random.below(2) == 0 {
+            let cell = space.resolution.map(|n| random.below(n as usize) as u32);
+            space = space.within(space.place_of(cell), [0; 3].map(|_| 1 + random.below(9) as u32));
+        }
+        let corners = [(); 3].map(|()| point_in(&mut random, &aabb));
+        let mut listed = Vec::new();
+        let looked_at = cells_near(&space, &Shape::Triangle(corners), |cell| listed.push(cell));
+        left_out += looked_at - listed.len() as u64;
+        let at = corners.map(|corner| space.point(corner));
+        for _ in 0..8 {
+            let (a, b) = (random.unit(), random.unit());
+            let (a, b) = if a + b > 1.0 { (1.0 - a, 1.0 - b) } else { (a, b) };
+            let point =
+                [0, 1, 2].map(|k| at[0][k] + a * (at[1][k] - at[0][k]) + b * (at[2][k] - at[0][k]));
+            // A point that the grid does not hold is in none of its cells.
+            let inside = (0..3).all(|k| (0.0..=f64::from(space.resolution[k])).contains(&point[k]));
+            if !inside {
+                continue;
+            }
+            for corner in 0..8 {
+                let cell = [0, 1, 2].map(|k| {
+                    let off = 0.75 * space.dilation[k] * [-1.0, 1.0][corner >> k & 1];
+                    ((point[k] + off) as u32).min(space.resolution[k] - 1)
+                });
+                points += 1;
+                assert!(listed.contains(&space.number(cell)), "{space:?} {corners:?} {cell:?}");
+            }
         }
     }
-    // The bound is for the worst grid there can be, whose cells are 2^-34 of a coordinate.
-    worst.assert_tight(0.0);
+    assert!(points > 10_000 && left_out > 10_000, "{points} {left_out}");
 }
 
-/// All that a block can hold lies inside the walls by more than rounding an exit can take.
+/// All that a block can hold lies inside the walls by more than rounding the times of entry and exit can take.
 #[test]
 fn exits_are_behind_the_contents() {
     let mut random = Random::new(44);
     for _ in 0..samples(100_000) {
-        let (head, aabb) = grid(&mut random);
-        let (lower, upper) = head.corners();
+        let aabb = bounds(&mut random);
+        let space = Space::over(&aabb, [0; 3].map(|_| 1 + random.below(300) as u32));
+        let (lower, upper) = (space.point(aabb.lower), space.point(aabb.upper));
         for k in 0..3 {
-            let margin =
-                (f64::from(aabb.lower[k]) - lower[k]).min(upper[k] - f64::from(aabb.upper[k]));
-            let size = lower[k].abs().max(upper[k].abs());
-            assert!(margin >= 64.0 * UNIT * size, "{k} {head:?} {aabb:?}");
-            assert!(margin >= DILATION * head.cell[k], "{k} {head:?} {aabb:?}");
+            let n = f64::from(space.resolution[k]);
+            let margin = lower[k].min(n - upper[k]);
+            assert!(margin >= 1.0 / 1024.0, "{k} {space:?} {aabb:?}");
         }
     }
 }

@@ -1,68 +1,66 @@
-//! A regular grid in flat arrays: which cells a box reaches, and which a ray.
+//! Grids in flat arrays: uniform ones, and grids within the cells of grids.
+//!
+//! [`uniform`] builds the plain grid, [`nested`] one whose full cells are divided again. A ray goes through both the same way:
+//! [`walk`] follows it from cell to cell, by the steps of [`steps`], in the coordinates of [`ray`].
 
 #[cfg(test)]
 mod bounds;
-mod build;
-mod cells;
-mod plan;
+mod nested;
+mod options;
+mod overlap;
+mod ray;
+mod space;
 mod steps;
-mod sweep;
+mod uniform;
 mod validate;
 mod walk;
 
-pub(crate) use build::{build, needs};
-pub(crate) use validate::grid_is_sound;
+pub use options::{GridKind, GridOptions};
+pub(crate) use validate::grids_are_sound;
 pub(crate) use walk::{Cells, walk};
 
-use glam::DVec3;
+use crate::block::Census;
+use crate::error::BuildError;
+use crate::prim::Survey;
+use crate::scene::Scene;
 
-use crate::block::cells::GridHead;
-use crate::math::Aabb;
-
-/// Primitives are put into every cell that their box comes nearer to than this part of a cell.
-///
-/// Stepping errs by less (see [`steps`]), so a ray never leaves the cells in which a primitive that
-/// it meets is listed.
-const DILATION: f64 = 1.0 / 1024.0;
-
-impl GridHead {
-    fn cell_count(&self) -> u64 {
-        self.resolution.iter().map(|n| u64::from(*n)).product()
-    }
-
-    /// The `i`-th wall across axis `k`: the same arithmetic wherever a wall is needed.
-    fn wall(&self, k: usize, i: u32) -> f64 {
-        self.lower[k] + f64::from(i) * self.cell[k]
-    }
-
-    /// The corners of the whole grid.
-    fn corners(&self) -> (DVec3, DVec3) {
-        let upper = [0, 1, 2].map(|k| self.wall(k, self.resolution[k]));
-        (self.lower.into(), upper.into())
-    }
-
-    /// The cell with coordinate `x` on axis `k`, or the one nearest to it. The cast saturates, and
-    /// NaN goes to cell 0.
-    fn cell_at(&self, k: usize, x: f64) -> u32 {
-        let i = ((x - self.lower[k]) / self.cell[k]) as u32;
-        i.min(self.resolution[k] - 1)
-    }
-
-    /// The first and the last cell on each axis that the box, dilated, reaches.
-    fn cells_of(&self, aabb: &Aabb) -> [[u32; 2]; 3] {
-        [0, 1, 2].map(|k| {
-            let dilation = self.cell[k] * DILATION;
-            [
-                self.cell_at(k, f64::from(aabb.lower[k]) - dilation),
-                self.cell_at(k, f64::from(aabb.upper[k]) + dilation),
-            ]
-        })
-    }
-
-    /// The number of the word of a cell.
-    fn word(&self, cell: [u32; 3]) -> usize {
-        let [i, j, k] = cell.map(|c| c as usize);
-        let [nx, ny, _] = self.resolution.map(|n| n as usize);
-        self.first_word as usize + i + nx * (j + ny * k)
+/// The bytes for the grid that the options ask for, and the bytes below which there is none.
+pub(crate) fn needs(
+    scene: &Scene,
+    survey: &Survey,
+    census: &Census,
+    options: &GridOptions,
+) -> Result<(usize, usize), BuildError> {
+    match options.kind {
+        GridKind::Uniform => uniform::needs(scene, survey, census, options),
+        GridKind::Nested | GridKind::Octree => nested::needs(survey, census),
     }
 }
+
+/// Builds into `bytes`, which are at least the minimum of [`needs`]; returns the size of the
+/// finished block. At least one primitive can be hit.
+pub(crate) fn build(
+    scene: &Scene,
+    survey: &Survey,
+    census: &Census,
+    options: &GridOptions,
+    bytes: &mut [u8],
+) -> Result<usize, BuildError> {
+    match options.kind {
+        GridKind::Uniform => uniform::build(scene, survey, census, options, bytes),
+        GridKind::Nested | GridKind::Octree => nested::build(scene, survey, census, options, bytes),
+    }
+}
+
+/// Origins further away than this many of the finest cells are too far for `f64`: rounding moves their rays by 2^-14 of a cell.
+const BEYOND: f64 = (1u64 << 36) as f64;
+
+/// How far around a cell primitives are listed in it, in cells, when `finest` of them would fill the outermost grid along that axis.
+///
+/// Stepping errs by less: twice `5 u n` along an axis of `n` cells, for the grids around it included, and 2^-13 for what `f64` is off.
+fn dilation(finest: f64) -> f64 {
+    1.0 / 4096.0 + finest / (1u64 << 20) as f64
+}
+
+/// The most finest cells along an axis: primitives are listed up to a sixteenth of a cell around them then.
+const FINEST: u32 = 1 << 16;

@@ -1,101 +1,147 @@
 //! The walk of a ray through the cells.
 
-use super::cells::CellRay;
-use super::steps::{Real, Steps};
-use super::sweep::sweep;
-use crate::block::cells::{EMPTY, GridHead, Run, run_start};
+use super::ray::CellRay;
+use super::steps::{Level, Part};
+use crate::block::cells::{
+    Cell, EMPTY, GridHead, MOST_DEPTH, Run, SIDES, cell, resolution, side_ahead,
+};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
-use crate::ray::{Interval, PreparedRay, WideSlab};
-use crate::simd::{Scalar, Simd};
+use crate::ray::{PreparedRay, Slab, WideSlab};
+use crate::simd::{Scalar, Simd, Width};
 
 /// The parts of a block that a walk reads.
 #[derive(Clone, Copy)]
 pub(crate) struct Cells<'m> {
-    pub head: &'m GridHead,
+    pub grids: &'m [GridHead],
     pub words: &'m [u32],
     pub runs: &'m [Run],
     pub leaves: Leaves<'m>,
 }
 
-/// Offers `query` everything the ray meets, near cells first; true when it ended the search.
+/// Offers `query` everything the ray meets, near cells of each grid first; true when it ended the search.
 ///
-/// Steps in `f32` where the ray starts within some thousand cells of the grid, in `f64` up to 2^39 cells,
-/// and beyond that sweeps over every cell that the ray can touch. Whichever it is, whatever the ray
-/// meets at `t` is in the list of a cell that the walk is in at `t`: primitives are listed in every cell
-/// within [`DILATION`](super::DILATION) of their box, and stepping errs by less. The hit need not lie in
-/// that cell, and nothing here asks it to.
+/// Whatever the ray meets at `t` is in the list of a cell that the walk is in at `t`: primitives are listed in every cell
+/// that they come nearer to than stepping errs. The hit need not lie in that cell, and nothing here asks it to.
 #[inline(always)]
 pub(crate) fn walk<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
     ray: &PreparedRay,
+    slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    let slab = WideSlab::new(ray);
-    let (lower, upper) = cells.head.corners();
-    let part = slab.clip(lower, upper, f64::from(query.t_bound()));
-    if part.is_empty() {
-        return false;
-    }
-    let cell_ray = CellRay::new(cells.head, ray);
-    if cell_ray.steps_safely::<f32>() {
-        step(s, cells, Steps::<f32>::new(&cell_ray, part), ray, query)
-    } else {
-        from_afar(cells, &cell_ray, part, ray, query)
-    }
-}
-
-/// The walk of a ray from so far away that `f32` would err. They are so rare that portable code will do.
-#[cold]
-#[inline(never)]
-fn from_afar<Q: Query>(
-    cells: &Cells,
-    cell_ray: &CellRay,
-    part: Interval<f64>,
-    ray: &PreparedRay,
-    query: &mut Q,
-) -> bool {
-    if cell_ray.steps_safely::<f64>() {
-        step(Scalar, cells, Steps::<f64>::new(cell_ray, part), ray, query)
-    } else {
-        sweep(cells, cell_ray, part, ray, query)
-    }
-}
-
-/// From cell to cell until the ray leaves the grid or the bound.
-#[inline(always)]
-fn step<S: Simd, Q: Query, F: Real>(
-    s: S,
-    cells: &Cells,
-    mut steps: Steps<F>,
-    ray: &PreparedRay,
-    query: &mut Q,
-) -> bool {
-    loop {
-        if visit(s, cells, steps.cell, ray, query) {
+    for head in cells.grids {
+        let first = head.first_word as usize;
+        let Some(n) = cells.words.get(first).map(|word| resolution(*word)) else { continue };
+        if n == [1; 3] {
+            // What lists a few large primitives is seen faster than where the ray is in it.
+            query.watch().step();
+            let word = cells.words.get(first + 1).copied().unwrap_or(EMPTY);
+            if let Cell::Run(run) = cell(word) {
+                if visit(s, cells, run, ray, slab, query) {
+                    return true;
+                }
+                continue;
+            }
+        }
+        let cell_ray = CellRay::new(head, n, ray);
+        if !cell_ray.is_near(head.finest) {
+            return from_afar(cells, ray, query);
+        }
+        let [enter, exit] = cell_ray.times();
+        let t_min = f64::from(ray.t_min);
+        let start = if t_min > enter { t_min } else { enter };
+        let t_bound = query.t_bound();
+        if !(start <= exit && start <= f64::from(t_bound)) {
+            continue;
+        }
+        let part = Part { start, exit };
+        let level = Level::outermost(s, &cell_ray, head.first_word, part, t_bound);
+        if walk_one(s, cells, level, cell_ray.turned, ray, slab, query) {
             return true;
         }
-        if !steps.advance(F::above(query.t_bound())) {
-            return false;
+    }
+    false
+}
+
+/// For a ray from so far away that not even `f64` tells its cells apart: every block is tested through its box.
+#[cold]
+#[inline(never)]
+fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool {
+    cells.leaves.intersect_all(Scalar, &mut { *ray }, &WideSlab::new(ray), query)
+}
+
+/// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search.
+#[inline(always)]
+fn walk_one<S: Simd, Q: Query>(
+    s: S,
+    cells: &Cells,
+    mut level: Level<<S as Width<4>>::V>,
+    turned: [u32; 3],
+    ray: &PreparedRay,
+    slab: &impl Slab,
+    query: &mut Q,
+) -> bool {
+    let octant = turned[0] & 1 | turned[1] & 2 | turned[2] & 4;
+    let mut outer = [level; MOST_DEPTH - 1];
+    let mut depth = 0;
+    loop {
+        query.watch().step();
+        let word = cells.words.get(level.place as usize).copied().unwrap_or(EMPTY);
+        let mut goes_on = true;
+        match cell(word) {
+            Cell::Empty => {
+                let side = side_ahead(word, octant);
+                goes_on = if side > 0 { level.jump(s, SIDES[side]) } else { level.step(s) };
+            }
+            Cell::Run(first) => {
+                if visit(s, cells, first, ray, slab, query) {
+                    return true;
+                }
+                level.look_up_to(s, query.t_bound());
+                goes_on = level.step(s);
+            }
+            Cell::Grid(first) => {
+                // A sound block has neither grids outside the words nor deeper ones.
+                let n = cells.words.get(first).map(|word| resolution(*word));
+                if let (Some(n), Some(place)) = (n, outer.get_mut(depth)) {
+                    *place = level;
+                    depth += 1;
+                    level = level.inner(s, (first as u32, n), turned, query.t_bound());
+                }
+            }
+            Cell::Unknown => return false,
+        }
+        while !goes_on {
+            if depth == 0 || level.ends_before_exit(query.t_bound()) {
+                return false;
+            }
+            depth -= 1;
+            level = outer[depth];
+            level.look_up_to(s, query.t_bound());
+            goes_on = level.step(s);
         }
     }
 }
 
-/// Offers `query` what the ray meets among the primitives listed in a cell.
+/// Offers `query` what the ray meets among the primitives of a run, block by block if it comes into their boxes: in a cell's corner
+/// there may be little of it.
 #[inline(always)]
-pub(super) fn visit<S: Simd, Q: Query>(
+fn visit<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
-    cell: [u32; 3],
+    first: usize,
     ray: &PreparedRay,
+    slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    query.watch().step();
-    let word = cells.words.get(cells.head.word(cell)).copied().unwrap_or(EMPTY);
-    let Some(first) = run_start(word) else { return false };
     for run in cells.runs.get(first..).unwrap_or(&[]) {
-        if cells.leaves.intersect(s, run.leaf(), ray, query) {
+        let leaf = run.leaf();
+        let aabb = cells.leaves.aabb((leaf.kind(), leaf.number()));
+        if !slab.part(&aabb, query.t_bound()).is_empty()
+            && cells.leaves.intersect(s, leaf, ray, query)
+        {
             return true;
         }
         if run.is_last() {

@@ -41,11 +41,6 @@ impl Aabb {
         }
     }
 
-    /// Twice the centre, rounded: any point that moves with the box will do for sorting.
-    pub fn centroid2(&self) -> DVec3 {
-        wide(self.lower) + wide(self.upper)
-    }
-
     /// The largest coordinate in size; 0 for the empty box.
     pub fn reach(&self) -> f32 {
         let corners = self.lower.into_iter().chain(self.upper);

@@ -140,6 +140,12 @@ pub(crate) fn for_each_prim(scene: &Scene, f: impl FnMut(Prim)) {
     for_each_prim_in(scene, 0..u32::MAX, false, f);
 }
 
+/// Calls `f` with each primitive that can be hit: quickly if the census found none that cannot.
+#[inline]
+pub(crate) fn for_each_counted(scene: &Scene, census: &Census, f: impl FnMut(Prim)) {
+    for_each_prim_in(scene, 0..u32::MAX, census.ignored_count == 0, f);
+}
+
 /// Calls `f` with each primitive in `range` that can be hit; with `sound`, all of them can.
 #[inline]
 pub(crate) fn for_each_prim_in(
@@ -200,7 +206,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
 }
 
 /// The shape with flat number `id`, whether it can be hit or not.
-pub(crate) fn shape(scene: &Scene, geometries: &[Geometry], id: u32) -> Option<Shape> {
+fn shape(scene: &Scene, geometries: &[Geometry], id: u32) -> Option<Shape> {
     let (number, geometry) = geometry_of(id, geometries)?;
     let prim = (id - geometry.first) as usize;
     match (number as usize).checked_sub(scene.mesh_count()) {

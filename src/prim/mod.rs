@@ -5,10 +5,10 @@ mod pack;
 mod validate;
 
 pub(crate) use gather::{
-    AHEAD, GRAIN, Prim, Shape, Shapes, Survey, for_each_prim, for_each_prim_in, geometries, shape,
+    AHEAD, GRAIN, Prim, Shape, Shapes, Survey, for_each_counted, for_each_prim_in, geometries,
     survey,
 };
-pub(crate) use pack::Packer;
+pub(crate) use pack::{Packer, pack_in_order};
 pub(crate) use validate::leaves_are_sound;
 
 use crate::block::Block;

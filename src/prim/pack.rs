@@ -1,11 +1,32 @@
 //! Fills leaf blocks, each to the end before the next.
 
-use super::gather::Shape;
+use super::gather::{Shape, for_each_prim, geometries};
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock,
     block_ref,
 };
+use crate::block::{Census, PartsMut};
 use crate::math::Aabb;
+use crate::scene::Scene;
+
+/// Packs all primitives in the order of their numbers, each once; returns the number of triangle blocks.
+pub(crate) fn pack_in_order(scene: &Scene, census: &Census, parts: PartsMut) -> u32 {
+    geometries(scene, parts.geometries);
+    let mut packer =
+        Packer::new(parts.triangle_blocks, parts.sphere_blocks, 0, census.triangle_count);
+    let (triangle_ids, sphere_ids) = parts.prim_ids.split_at_mut(census.triangle_count as usize);
+    let (mut triangle_ids, mut sphere_ids) = (triangle_ids.iter_mut(), sphere_ids.iter_mut());
+    for_each_prim(scene, |prim| {
+        let ids = match prim.shape {
+            Shape::Triangle(_) => &mut triangle_ids,
+            Shape::Sphere { .. } => &mut sphere_ids,
+        };
+        if let (Some(id), Some(_)) = (ids.next(), packer.push(&prim.shape)) {
+            *id = prim.id;
+        }
+    });
+    packer.triangle_block_count() as u32
+}
 
 /// Primitives go in one by one and come to lie in blocks, in the order of their coming.
 ///

@@ -158,6 +158,46 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
         Width::<4>::splat(self, if larger > z { larger } else { z })
     }
 
+    /// In the first three lanes the least of them; any number if one is NaN, and a zero of either sign.
+    #[inline(always)]
+    fn least_of_three(self, v: <Self as Width<4>>::V) -> <Self as Width<4>>::V {
+        let mut lanes = [0.0; 4];
+        v.store(&mut lanes);
+        let [x, y, z, _] = lanes;
+        let smaller = if x < y { x } else { y };
+        Width::<4>::splat(self, if smaller < z { smaller } else { z })
+    }
+
+    /// `v` in the lanes in which `a <= b`, otherwise zero.
+    #[inline(always)]
+    fn where_less_or_equal(
+        self,
+        a: <Self as Width<4>>::V,
+        b: <Self as Width<4>>::V,
+        v: <Self as Width<4>>::V,
+    ) -> <Self as Width<4>>::V {
+        let (mut lanes, chosen) = ([0.0; 4], a.less_or_equal(b));
+        v.store(&mut lanes);
+        for (i, lane) in lanes.iter_mut().enumerate() {
+            *lane = if chosen >> i & 1 == 1 { *lane } else { 0.0 };
+        }
+        self.load(&lanes)
+    }
+
+    /// Each lane rounded towards zero, while it is below 2^31 in size.
+    #[inline(always)]
+    fn whole(self, v: <Self as Width<4>>::V) -> [i32; 4] {
+        let mut lanes = [0.0; 4];
+        v.store(&mut lanes);
+        lanes.map(|lane| lane as i32)
+    }
+
+    /// The floats nearest to whole numbers.
+    #[inline(always)]
+    fn floats(self, whole: [i32; 4]) -> <Self as Width<4>>::V {
+        self.load(&whole.map(|lane| lane as f32))
+    }
+
     /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
     /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
     #[inline(always)]

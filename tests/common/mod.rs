@@ -3,14 +3,14 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 use raykern::{
-    Accel, Backend, BuildOptions, Hit, Layout, OwnedAccel, PlainList, Quality, QueryOptions, Ray,
-    Scene,
+    Accel, Backend, BuildOptions, GridKind, GridOptions, Hit, Layout, OwnedAccel, PlainList,
+    Quality, QueryOptions, Ray, Scene,
 };
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
 
-/// List, grid, and BVH in every layout and quality over one scene, each forced.
-pub struct All([(&'static str, OwnedAccel); 10]);
+/// List, grids of every kind, and BVH in every layout and quality over one scene, each forced.
+pub struct All([(&'static str, OwnedAccel); 13]);
 
 /// Uses the backend that the environment's `RAYKERN_BACKEND` names, if it names one.
 pub fn choose_backend() {
@@ -31,9 +31,18 @@ impl All {
             built
         };
         let bvh = |layout| of_quality(layout, Quality::Balanced);
+        let grid = |kind, density, depth| {
+            let options = BuildOptions { grid: GridOptions { kind, density, depth }, ..never };
+            let built = OwnedAccel::grid(scene, &options).expect("a grid");
+            Accel::open(built.accel().block()).expect("a sound block");
+            built
+        };
         All([
             ("list", OwnedAccel::bvh(scene, &with(PlainList::Always)).expect("a list")),
-            ("grid", OwnedAccel::grid(scene, &never).expect("a grid")),
+            ("nested grid", grid(GridKind::Nested, 0.0, 0)),
+            ("fine nested grid", grid(GridKind::Nested, 3.0, 2)),
+            ("uniform grid", grid(GridKind::Uniform, 0.0, 0)),
+            ("octree", grid(GridKind::Octree, 0.0, 0)),
             ("compact", bvh(Layout::Compact)),
             ("wide 4", bvh(Layout::Wide(4))),
             ("wide 8", bvh(Layout::Wide(8))),
@@ -49,7 +58,7 @@ impl All {
         model.with_scene(Self::build)
     }
 
-    pub fn accels(&self) -> [(&'static str, Accel<'_>); 10] {
+    pub fn accels(&self) -> [(&'static str, Accel<'_>); 13] {
         self.0.each_ref().map(|(name, built)| (*name, built.accel()))
     }
 }

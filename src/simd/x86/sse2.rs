@@ -31,6 +31,26 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
+    fn least_of_three(self, v: F4) -> F4 {
+        v.least_of_three()
+    }
+
+    #[inline(always)]
+    fn where_less_or_equal(self, a: F4, b: F4, v: F4) -> F4 {
+        a.where_less_or_equal(b, v)
+    }
+
+    #[inline(always)]
+    fn whole(self, v: F4) -> [i32; 4] {
+        v.whole()
+    }
+
+    #[inline(always)]
+    fn floats(self, whole: [i32; 4]) -> F4 {
+        F4::from_whole(whole)
+    }
+
+    #[inline(always)]
     fn prefetch<T>(self, what: &T) {
         super::prefetch(what);
     }
@@ -56,6 +76,40 @@ impl F4 {
             let last = _mm_shuffle_ps::<0b00_01_00_10>(self.0, self.0);
             F4(_mm_max_ps(_mm_max_ps(self.0, next), last))
         }
+    }
+
+    /// See [`Simd::least_of_three`].
+    #[inline(always)]
+    pub fn least_of_three(self) -> Self {
+        // SAFETY: SSE2 is there.
+        unsafe {
+            let next = _mm_shuffle_ps::<0b00_00_10_01>(self.0, self.0);
+            let last = _mm_shuffle_ps::<0b00_01_00_10>(self.0, self.0);
+            F4(_mm_min_ps(_mm_min_ps(self.0, next), last))
+        }
+    }
+
+    /// See [`Simd::where_less_or_equal`].
+    #[inline(always)]
+    pub fn where_less_or_equal(self, other: Self, v: Self) -> Self {
+        // SAFETY: SSE2 is there.
+        F4(unsafe { _mm_and_ps(_mm_cmple_ps(self.0, other.0), v.0) })
+    }
+
+    /// See [`Simd::whole`].
+    #[inline(always)]
+    pub fn whole(self) -> [i32; 4] {
+        let mut whole = [0; 4];
+        // SAFETY: SSE2 is there, and the array has four numbers.
+        unsafe { _mm_storeu_si128(whole.as_mut_ptr().cast(), _mm_cvttps_epi32(self.0)) };
+        whole
+    }
+
+    /// See [`Simd::floats`].
+    #[inline(always)]
+    pub fn from_whole(whole: [i32; 4]) -> Self {
+        // SAFETY: SSE2 is there, and the array has four numbers.
+        F4(unsafe { _mm_cvtepi32_ps(_mm_loadu_si128(whole.as_ptr().cast())) })
     }
 }
 

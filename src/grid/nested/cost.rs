@@ -1,0 +1,63 @@
+//! How finely to divide, and whether to.
+
+use crate::block::cells::MOST_CELLS;
+use crate::grid::options::{GridKind, GridOptions};
+use crate::grid::space::{Place, Space, cubes, proportions};
+use crate::math::Aabb;
+use crate::math::float::cube_root;
+
+/// Cells for each primitive in the outermost grid, and in those within cells.
+const OUTER_DENSITY: f64 = 0.02;
+const INNER_DENSITY: f64 = 0.25;
+/// A cell with no more than this many primitives is not divided.
+pub(super) const FULL: u32 = 16;
+/// The most cells along an axis of a grid within a cell.
+const MOST_INNER: f64 = 64.0;
+
+/// Costs in steps from cell to cell: a leaf block, how many primitives of a cell one holds, and coming into a grid.
+const BLOCK: f64 = 3.0;
+const IN_A_BLOCK: u32 = 12;
+const ENTRY: f64 = 2.0;
+
+/// The resolution of the outermost grid over `count` primitives, `coarser` times too coarse along each axis.
+pub(super) fn outer(bounds: &Aabb, options: &GridOptions, count: u32, coarser: u32) -> [u32; 3] {
+    let proportions = proportions(bounds);
+    let cells = match options.kind {
+        GridKind::Octree => [2.0; 3],
+        _ => cubes(proportions, f64::from(count) * options.density().unwrap_or(OUTER_DENSITY)),
+    };
+    // A flat axis has one cell whatever is asked for.
+    cells.map(|n| ((n + 0.5) as u32 >> coarser).clamp(1, MOST_CELLS))
+}
+
+/// The resolution of a grid in a cell with `count` primitives, `coarser` times too coarse along each axis; `None` when one
+/// cell would be all of it.
+pub(super) fn inner(
+    space: &Space,
+    cell: &Place,
+    options: &GridOptions,
+    count: u32,
+    coarser: u32,
+) -> Option<[u32; 3]> {
+    let parts = match options.kind {
+        GridKind::Octree => [2.0; 3],
+        _ => cubes(space.edges(cell), f64::from(count) * INNER_DENSITY),
+    };
+    let most = space.most_parts(cell);
+    let resolution =
+        [0, 1, 2].map(|k| ((parts[k] + 0.5).min(MOST_INNER).min(most[k]) as u32 >> coarser).max(1));
+    (resolution != [1; 3]).then_some(resolution)
+}
+
+/// What a cell with `count` primitives costs a ray.
+fn of_cell(count: u32) -> f64 {
+    BLOCK * f64::from(count.div_ceil(IN_A_BLOCK))
+}
+
+/// Whether a cell with `count` primitives had better be divided into cells with `counts`: a ray goes through as many of
+/// them as there are along an edge, and meets each as often as its share of the surface says.
+pub(super) fn is_worth_it(count: u32, counts: &[u32]) -> bool {
+    let along = cube_root(counts.len() as f64);
+    let sum: f64 = counts.iter().map(|count| of_cell(*count)).sum();
+    ENTRY + along + sum / (along * along) < of_cell(count)
+}

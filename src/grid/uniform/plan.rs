@@ -1,0 +1,112 @@
+//! How fine the grid is, and how much memory that takes.
+
+use crate::block::cells::{MOST_CELLS, VALUE, cell_count};
+use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
+use crate::block::{Census, Counts};
+use crate::error::BuildError;
+use crate::grid::options::GridOptions;
+use crate::grid::space::{Space, cubes, proportions};
+use crate::math::float::cube_root;
+use crate::prim::{Survey, for_each_counted};
+use crate::scene::Scene;
+
+/// References from cells to primitives, for each primitive, above which a grid is made coarser. A
+/// scene of large primitives would otherwise fill each cell with all of them.
+const REFERENCES_PER_PRIM: u64 = 32;
+/// A scene of few primitives may have this many references in any case.
+const REFERENCES_AT_LEAST: u64 = 4096;
+
+/// A grid that was not built yet.
+pub(crate) struct Plan {
+    pub space: Space,
+    /// Sizes of the parts, with room for the most triangle blocks and runs there can be.
+    pub counts: Counts,
+    /// The bytes they take.
+    pub size: usize,
+}
+
+/// How fine a grid is meant to be: cells along each axis, in fractions of one.
+///
+/// The cube root of the number of primitives, along each axis; or, if a density is given, cubes.
+fn wanted(census: &Census, options: &GridOptions) -> [f64; 3] {
+    let count = f64::from(census.hittable());
+    match options.density() {
+        None => [cube_root(count); 3],
+        Some(density) => cubes(proportions(&census.bounds), count * density),
+    }
+}
+
+/// The resolution nearest to what is wanted.
+fn rounded(cells: [f64; 3]) -> [u32; 3] {
+    cells.map(|n| ((n + 0.5) as u32).clamp(1, MOST_CELLS))
+}
+
+impl Plan {
+    /// The plan with this resolution, or `None` when it refers to primitives too often.
+    fn with(scene: &Scene, survey: &Survey, census: &Census, resolution: [u32; 3]) -> Option<Plan> {
+        let space = Space::over(&census.bounds, resolution);
+        let cells = cell_count(space.resolution);
+        let prims = u64::from(census.hittable());
+        let most = (REFERENCES_PER_PRIM * prims).max(REFERENCES_AT_LEAST).min(u64::from(VALUE));
+        // In a single cell everything is once.
+        let references = if cells == 1 { prims } else { references(scene, census, &space) };
+        if references > most && cells > 1 {
+            return None;
+        }
+        let sphere_blocks = census.sphere_count.div_ceil(SPHERES as u32);
+        let triangle_blocks = census.triangle_count.div_ceil(TRIANGLES_AT_LEAST as u32);
+        // No block is twice in a run.
+        let blocks = u64::from(sphere_blocks) + u64::from(triangle_blocks);
+        let runs = references.min(blocks * cells);
+        let counts = Counts {
+            geometries: survey.geometry_count,
+            prim_ids: census.hittable(),
+            grids: 1,
+            words: u32::try_from(1 + cells).ok()?,
+            sphere_blocks,
+            triangle_blocks,
+            runs: u32::try_from(runs).ok()?,
+            ..Counts::default()
+        };
+        Some(Plan { space, counts, size: counts.offsets()?.end })
+    }
+
+    /// The finest plan that takes at most `limit` bytes: as the rule says, and a fifth less along each axis at each further try,
+    /// down to a single cell.
+    pub fn finest(
+        scene: &Scene,
+        survey: &Survey,
+        census: &Census,
+        options: &GridOptions,
+        limit: usize,
+    ) -> Result<Plan, BuildError> {
+        let mut cells = wanted(census, options);
+        loop {
+            let resolution = rounded(cells);
+            let is_one = resolution == [1; 3];
+            match Plan::with(scene, survey, census, resolution) {
+                Some(plan) if plan.size <= limit => return Ok(plan),
+                Some(plan) if is_one => {
+                    return Err(BuildError::OutOfMemory { minimum: plan.size });
+                }
+                None if is_one => return Err(BuildError::TooLarge),
+                _ => cells = cells.map(|n| n * 0.8),
+            }
+        }
+    }
+
+    /// The plan that takes the least memory: one cell.
+    pub fn coarsest(scene: &Scene, survey: &Survey, census: &Census) -> Result<Plan, BuildError> {
+        Plan::with(scene, survey, census, [1; 3]).ok_or(BuildError::TooLarge)
+    }
+}
+
+/// How often cells refer to primitives: a bound on the entries of all runs.
+fn references(scene: &Scene, census: &Census, space: &Space) -> u64 {
+    let mut sum = 0u64;
+    for_each_counted(scene, census, |prim| {
+        let cells = space.range_of(&prim.shape.aabb()).cell_count();
+        sum = sum.saturating_add(cells);
+    });
+    sum
+}
