@@ -7,10 +7,10 @@ use crate::scene::Scene;
 
 /// Below this many rays for each primitive a uniform grid saves more time while it is built than its rays lose, if the
 /// scene is even.
-const FEW_RAYS: f32 = 0.25;
+const FEW_RAYS: f32 = 0.15;
 
 /// A scene is even if a primitive has up to this many times as many others in its part of space as it would if all were spread over
-/// the whole box: a surface has about two to six, an object in a hall hundreds.
+/// the whole box.
 const EVEN: f64 = 16.0;
 
 /// Parts of the box along each axis.
