@@ -243,3 +243,58 @@ fn every_operation_means_what_the_portable_one_does() {
         }
     }
 }
+
+/// What is done with three coordinates.
+#[derive(Debug, PartialEq)]
+struct OfThree {
+    least: bool,
+    chosen: [u32; 4],
+    whole: [i32; 4],
+    floats: [u32; 4],
+}
+
+/// The operations on four lanes that walks through grids use.
+struct WithThree([[f32; 4]; 3]);
+
+impl Kernel for WithThree {
+    type Output = OfThree;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> OfThree {
+        let Self([a, b, c]) = self;
+        let [mut least, mut chosen, mut floats] = [[0.0; 4]; 3];
+        let (va, vb) = (Width::<4>::load(s, &a), Width::<4>::load(s, &b));
+        s.least_of_three(va).store(&mut least);
+        s.where_less_or_equal(va, vb, Width::<4>::load(s, &c)).store(&mut chosen);
+        let whole = s.whole(va);
+        s.floats(whole).store(&mut floats);
+        OfThree {
+            // A zero may have either sign.
+            least: least[..3].iter().all(|x| *x == a[0].min(a[1]).min(a[2])),
+            chosen: chosen.map(f32::to_bits),
+            whole,
+            floats: floats.map(f32::to_bits),
+        }
+    }
+}
+
+#[test]
+fn three_coordinates_are_treated_alike() {
+    let best = Backend::detected();
+    let mut state = 2;
+    for _ in 0..20_000 {
+        // Whole numbers of up to 31 bits, large and small, of both signs, some equal.
+        let mut lane = || {
+            let bits = random(&mut state);
+            (bits as i32 >> 1 >> (bits >> 32 & 31)) as f32 / [1.0, 4.0][(bits >> 40 & 1) as usize]
+        };
+        let lanes = [(); 3].map(|()| [(); 4].map(|()| lane()));
+        let expected = WithThree(lanes).run(Scalar);
+        assert!(expected.least);
+        for backend in Backend::ALL.into_iter().filter(|backend| *backend <= best) {
+            // SAFETY: `detected` says that there is this one.
+            let got = unsafe { native::run_with(backend, WithThree(lanes)) };
+            assert_eq!(got, expected, "{backend:?}: {lanes:?}");
+        }
+    }
+}
