@@ -153,10 +153,9 @@ impl Axis {
         }
         let (mut all, mut count, mut best) = (Box4::EMPTY, 0, None);
         let mut least = least;
-        for slab in 1..SLABS {
+        for (slab, &(right_work, right_count)) in right.iter().enumerate().skip(1) {
             all.add(&self.bounds[slab - 1]);
             count += self.begins[slab - 1];
-            let (right_work, right_count) = right[slab];
             let work = areas.of_finite(&all) * count as f32 + right_work;
             let both = count > 0 && right_count > 0;
             if both && work < least && allowed([count, right_count]) {
