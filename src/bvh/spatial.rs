@@ -153,7 +153,7 @@ impl Axis {
         }
         let (mut all, mut count, mut best) = (Box4::EMPTY, 0, None);
         let mut least = least;
-        for (slab, (right_work, right_count)) in right.into_iter().enumerate().skip(1) {
+        for (slab, &(right_work, right_count)) in right.iter().enumerate().skip(1) {
             all.add(&self.bounds[slab - 1]);
             count += self.begins[slab - 1];
             let work = areas.of_finite(&all) * count as f32 + right_work;
