@@ -34,7 +34,7 @@ impl Effort {
     /// The effort where few refs are much larger than the others, such as the walls of a building: a sample says nothing
     /// of them, and where they are parted matters. `None` for scenes that are even enough.
     pub fn for_uneven(self, unevenness: f64) -> Option<Effort> {
-        let uneven = Effort { samples: ALL, one_axis: false, ..self };
+        let uneven = Effort { bins: BINS, samples: ALL, one_axis: false, ..self };
         (unevenness > self.even).then_some(uneven)
     }
 }
