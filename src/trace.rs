@@ -283,7 +283,7 @@ fn trace<S: Simd, Q: Query>(
                 let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
                 grid::walk(s, &Cells { grids, words, runs, leaves }, ray.prepare(), slab, query)
             }
-            _ => leaves.intersect_all(s, ray, slab, query),
+            _ => leaves.intersect_all(s, ray.prepare(), slab, query),
         },
     }
 }

@@ -69,7 +69,7 @@ pub(crate) fn walk<S: Simd, Q: Query>(
 #[cold]
 #[inline(never)]
 fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool {
-    cells.leaves.intersect_all(Scalar, &mut { *ray }, &WideSlab::new(ray), query)
+    cells.leaves.intersect_all(Scalar, ray, &WideSlab::new(ray), query)
 }
 
 /// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search.

@@ -17,7 +17,7 @@ use crate::block::leaf::{
 };
 use crate::math::Aabb;
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
-use crate::ray::{Late, PreparedRay, Slab, WideSlab};
+use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Triangles};
 use crate::simd::{Kernel, Simd};
 
@@ -59,7 +59,7 @@ impl Leaves<'_> {
     pub fn intersect_all<S: Simd, Q: Query>(
         &self,
         s: S,
-        late: &mut impl Late,
+        ray: &PreparedRay,
         slab: &impl Slab,
         query: &mut Q,
     ) -> bool {
@@ -69,13 +69,11 @@ impl Leaves<'_> {
             if part.is_empty() {
                 continue;
             }
-            let ray = late.prepare();
             if self.intersect_block(s, KIND_TRIANGLES, number, block.lanes(), ray, query) {
                 return true;
             }
         }
         for (number, block) in self.sphere_blocks.iter().enumerate() {
-            let ray = late.prepare();
             if self.intersect_block(s, KIND_SPHERES, number, block.lanes(), ray, query) {
                 return true;
             }

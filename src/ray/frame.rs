@@ -312,10 +312,7 @@ impl<S: Simd> Late for LateRay<S> {
 
     #[inline(always)]
     fn prepare(&mut self) -> &PreparedRay {
-        if self.prepared.is_none() {
-            self.prepared = Some(self.rest());
-        }
-        self.prepared.get_or_insert(PreparedRay::BLANK)
+        self.prepared.insert(self.rest())
     }
 }
 
