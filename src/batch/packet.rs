@@ -199,7 +199,7 @@ impl<'m, Q: Together<'m>, A> Company<'_, 'm, Q, A> {
             let lane = rest.trailing_zeros() as usize % 16;
             rest &= rest - 1;
             let Some(given) = self.batch.rays.get(16 * group + lane) else { return };
-            let Some((ray, _)) = given.prepare_with(Scalar, reach) else { continue };
+            let Some(ray) = given.prepare(reach) else { continue };
             let mut query = self.batch.question.query(self.batch.block, ray.t_max);
             if let Some(leaf) = self.leaf(group, lane) {
                 self.leaves.intersect(Scalar, leaf, &ray, &mut query);
@@ -257,7 +257,7 @@ impl<'m, Q: Together<'m>, A> Company<'_, 'm, Q, A> {
     #[inline(never)]
     fn settle_alone(&mut self, number: usize, leaf: LeafRef) {
         let Batch { block, rays, question, .. } = self.batch;
-        let Some((ray, _)) = rays[number].prepare_with(Scalar, block.header.reach) else { return };
+        let Some(ray) = rays[number].prepare(block.header.reach) else { return };
         let mut query = question.query(block, ray.t_max);
         let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
         self.batch.write(number, Q::answer(block, &ray, &mut query, ended));

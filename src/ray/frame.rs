@@ -5,9 +5,7 @@ use super::slab::{NarrowSlab, Scales};
 use crate::exact::Line;
 use crate::math::float::{narrow_power_of_two, power_of_two};
 use crate::math::rounding::{UNIT32, f32_above, f32_below};
-#[cfg(test)]
-use crate::simd::Scalar;
-use crate::simd::{Lanes, Simd, Width};
+use crate::simd::{Lanes, Scalar, Simd, Width};
 
 /// A ray that can hit something, with what every box and primitive test needs of it.
 ///
@@ -224,7 +222,6 @@ impl Ray {
     }
 
     /// The same without boxes, of any ray that can hit something.
-    #[cfg(test)]
     pub(crate) fn prepare(&self, reach: f32) -> Option<PreparedRay> {
         match self.prepare_with(Scalar, reach) {
             Some((ray, _)) => Some(ray),
