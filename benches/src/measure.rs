@@ -146,7 +146,7 @@ const TOO_SLOW: f64 = 30.0;
 /// Each so many-th ray is in the sample.
 const SAMPLE: usize = 50;
 /// Each so many-th ray is traced once more before a timed run.
-const WARM_UP: usize = 4;
+const WARM_UP: usize = 1;
 
 /// A first run of each method warms up and is checked; then all take turns, each round begun by
 /// another one, so that whatever slows the machine for a while slows all of them.

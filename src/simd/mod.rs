@@ -12,13 +12,22 @@ mod macros;
 #[macro_use]
 #[allow(unused_macros, dead_code, reason = "as above")]
 mod doubled;
-/// What this processor has: `detect` and `run_with`.
-#[cfg_attr(target_arch = "x86_64", path = "x86/mod.rs")]
+/// What this processor has: `detect` and `run_with`. With `--cfg raykern_portable` nothing but [`Scalar`], which compiles
+/// in a fraction of the time.
+#[cfg_attr(all(not(raykern_portable), target_arch = "x86_64"), path = "x86/mod.rs")]
 #[cfg_attr(
-    all(target_arch = "aarch64", target_feature = "neon", target_endian = "little"),
+    all(
+        not(raykern_portable),
+        target_arch = "aarch64",
+        target_feature = "neon",
+        target_endian = "little"
+    ),
     path = "neon.rs"
 )]
-#[cfg_attr(all(target_arch = "wasm32", target_feature = "simd128"), path = "wasm.rs")]
+#[cfg_attr(
+    all(not(raykern_portable), target_arch = "wasm32", target_feature = "simd128"),
+    path = "wasm.rs"
+)]
 mod native;
 mod scalar;
 #[cfg(test)]
