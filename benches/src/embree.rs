@@ -44,8 +44,8 @@ struct Setup {
     quality: c_int,
     robust: bool,
     single: Class,
-    /// The class of packets and streams; `None` to leave them out.
-    batch: Option<Class>,
+    /// The classes of streams, and of packets and streams with the coherent flag; `None` to leave them out.
+    batch: Option<[Class; 2]>,
 }
 
 const SETUPS: [Setup; 4] = [
@@ -54,14 +54,14 @@ const SETUPS: [Setup; 4] = [
         quality: 1,
         robust: false,
         single: Class::Embree,
-        batch: Some(Class::EmbreeBatch),
+        batch: Some([Class::EmbreeStream, Class::EmbreePackets]),
     },
     Setup {
         name: "embree-robust",
         quality: 1,
         robust: true,
         single: Class::EmbreeRobust,
-        batch: Some(Class::EmbreeRobustBatch),
+        batch: Some([Class::EmbreeRobustBatch; 2]),
     },
     Setup {
         name: "embree-high",
@@ -92,20 +92,25 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) {
             };
             lineup.built(&name, seconds, Some(scene.bytes()));
             let scene = Rc::new(scene);
-            if let Some(class) = setup.batch {
-                add_batches(lineup, &name, class, &scene);
+            if let Some(classes) = setup.batch {
+                add_batches(lineup, &name, classes, &scene);
             }
             lineup.add(name, setup.single, Single(scene));
         }
     }
 }
 
-fn add_batches(lineup: &mut Lineup, name: &str, class: Class, scene: &Rc<Scene>) {
-    for (form, width, coherent) in [
-        ("x8", 8, None),
-        ("x16", 16, None),
-        ("stream", 1, Some(false)),
-        ("stream coherent", 1, Some(true)),
+fn add_batches(
+    lineup: &mut Lineup,
+    name: &str,
+    [streams, packets]: [Class; 2],
+    scene: &Rc<Scene>,
+) {
+    for (form, class, width, coherent) in [
+        ("x8", packets, 8, None),
+        ("x16", packets, 16, None),
+        ("stream", streams, 1, Some(false)),
+        ("stream coherent", packets, 1, Some(true)),
     ] {
         let batch = Batched { scene: scene.clone(), width, coherent };
         lineup.add(format!("{name} {form}"), class, batch);

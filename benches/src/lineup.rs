@@ -45,8 +45,10 @@ pub enum Class {
     EmbreeHigh,
     /// As `Embree`, with the quality low.
     EmbreeLow,
-    /// Packets and streams, medium quality, default accuracy.
-    EmbreeBatch,
+    /// Streams without the coherent flag, medium quality, default accuracy.
+    EmbreeStream,
+    /// Packets, and streams with the flag.
+    EmbreePackets,
     /// Packets and streams in the robust mode.
     EmbreeRobustBatch,
     /// A library in Rust, or with a face in Rust.

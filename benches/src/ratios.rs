@@ -19,7 +19,7 @@ const WATERTIGHT: Class = Class::Single(Precision::Watertight);
 const BATCH: Class = Class::Batch(Precision::Exact);
 
 /// Of several devices or forms the fastest counts, for each scene and kind of ray anew.
-const MATCHES: [Match; 15] = [
+const MATCHES: [Match; 16] = [
     Match { ours: EXACT, against: "itself (the noise)", peers: &[Class::Noise] },
     Match { ours: EXACT, against: "embree", peers: &[Class::Embree] },
     Match { ours: EXACT, against: "embree robust", peers: &[Class::EmbreeRobust] },
@@ -27,11 +27,20 @@ const MATCHES: [Match; 15] = [
     Match { ours: EXACT, against: "rust peers", peers: &[Class::RustPeer] },
     Match { ours: WATERTIGHT, against: "embree", peers: &[Class::Embree] },
     Match { ours: WATERTIGHT, against: "embree robust", peers: &[Class::EmbreeRobust] },
-    Match { ours: BATCH, against: "embree, any form", peers: &[Class::EmbreeBatch, Class::Embree] },
+    Match {
+        ours: BATCH,
+        against: "embree, one ray or stream",
+        peers: &[Class::Embree, Class::EmbreeStream],
+    },
+    Match {
+        ours: BATCH,
+        against: "embree, any form",
+        peers: &[Class::Embree, Class::EmbreeStream, Class::EmbreePackets],
+    },
     Match {
         ours: BATCH,
         against: "embree robust, any form",
-        peers: &[Class::EmbreeRobustBatch, Class::EmbreeRobust],
+        peers: &[Class::EmbreeRobust, Class::EmbreeRobustBatch],
     },
     Match { ours: Class::Fast, against: "our bvh", peers: &[EXACT] },
     Match { ours: Class::Fast, against: "embree low", peers: &[Class::EmbreeLow] },

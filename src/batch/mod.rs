@@ -10,9 +10,15 @@ use crate::ray::{Alike, Ray};
 use crate::simd::{self, Kernel, Simd};
 use crate::trace::{Question, Together, ask};
 
-/// Blocks of fewer bytes mostly are in the cache, and single calls then wait for nothing that others could use: with
-/// closest hits, and with any hits, which are over sooner.
+/// Of blocks of fewer bytes, what rays visit mostly is in the cache, and single calls then wait for nothing that others could
+/// use: with closest hits, and with any hits, which are over sooner.
 const NEAR: [usize; 2] = [2 << 20, 16 << 20];
+/// The same for rays that begin where the one before did, and so visit again what that brought near.
+const NEAR_TOGETHER: usize = 31 << 20;
+/// How far apart two rays begin that have nothing to do with each other, of the scene's largest coordinate.
+const FAR: f32 = 1.0 / 64.0;
+/// So many rays are looked at for that.
+const LOOKED_AT: usize = 64;
 
 /// Answers `question` for each ray, by `keep` into its answer; stops at the end of the shorter slice.
 pub(crate) fn ask_all<'m, Q: Together<'m>, A>(
@@ -65,14 +71,14 @@ impl<'m, Q: Together<'m>, A> Kernel for Batch<'_, 'm, Q, A> {
             return ask_each(block.whole, rays, answers, question, keep);
         }
         let count = self.rays.len().min(self.answers.len());
-        let near = self.block.whole.bytes().len() < NEAR[usize::from(!Q::Query::ORDERED)];
+        let size = self.block.whole.bytes().len();
         let mut first = 0;
         while first < count {
             let (alike, end) = self.stretch(s, first, count);
             let part = self.part(first, end);
             if let Some(alike) = alike {
                 part.trace_together(s, alike);
-            } else if near {
+            } else if size < part.least_to_fly() {
                 ask_each(part.block.whole, part.rays, part.answers, part.question, part.keep);
             } else {
                 part.fly(s);
@@ -95,6 +101,23 @@ impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
             end = count.min(end + 16);
         }
         (None, end)
+    }
+
+    /// The bytes of a block in which some of these rays are so often waited for that others had better go on meanwhile.
+    #[inline(always)]
+    fn least_to_fly(&self) -> usize {
+        let far = FAR * self.block.header.reach;
+        let (mut pairs, mut apart) = (0, 0);
+        for pair in self.rays.windows(2).take(LOOKED_AT) {
+            let mut most = 0f32;
+            for k in 0..3 {
+                most = most.max((pair[1].origin[k] - pair[0].origin[k]).abs());
+            }
+            pairs += 1;
+            apart += usize::from(most > far);
+        }
+        let together = if 2 * apart < pairs { NEAR_TOGETHER } else { 0 };
+        together.max(NEAR[usize::from(!Q::Query::ORDERED)])
     }
 
     /// The rays from `first` to `end`.
