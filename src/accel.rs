@@ -2,17 +2,21 @@
 
 use crate::batch;
 use crate::block::cells::resolution;
+use crate::block::level::Level;
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST};
 use crate::bvh;
 use crate::error::OpenError;
 use crate::grid;
+use crate::levels;
 use crate::prim::{self, Leaves};
 use crate::query::{
     Choice, Counts, Decide, Exact, Meets, Precision, PrimId, QueryOptions, Watch, Watertight,
     flat_number,
 };
-use crate::ray::{Hit, Ray};
-use crate::surface::{self, Surface};
+use crate::ray::{Hit, NONE, Ray};
+use crate::scene::Instance;
+use crate::storage::ALIGNMENT;
+use crate::surface::{Spot, Surface};
 use crate::trace::{self, AnyHit, ClosestHit, LocateHit};
 
 /// What a block holds.
@@ -39,14 +43,24 @@ pub enum Layout {
     Wide(u32),
 }
 
+impl<'c> Instance<'c> {
+    /// What is in `accel`, mapped from its object space to the world by three rows of four, the last column the shift:
+    /// any map that has an inverse, mirroring, uneven scaling and shear included.
+    ///
+    /// The accel has no instances itself, which a build checks.
+    pub fn new(accel: &Accel<'c>, object_to_world: [f32; 12]) -> Self {
+        Instance { child: accel.0, object_to_world, mask: 0 }
+    }
+}
+
 /// What a block holds, in numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Info {
-    /// The structure.
+    /// The structure: that over the instances, if there are any.
     pub kind: Kind,
     /// How its nodes lie in memory; compact where there are none.
     pub layout: Layout,
-    /// Lower corner of the box around everything that can be hit.
+    /// Lower corner of the box around everything that can be hit, instances included.
     pub lower: [f32; 3],
     /// Upper corner; below `lower` when nothing can be hit.
     pub upper: [f32; 3],
@@ -54,15 +68,17 @@ pub struct Info {
     pub triangle_count: u32,
     /// Spheres that can be hit.
     pub sphere_count: u32,
+    /// Instances, which are not counted by what is in them.
+    pub instance_count: u32,
     /// Triangles without area, spheres without radius, and whatever is not finite.
     pub ignored_count: u32,
     /// Cells along each axis of a grid, of the outermost one if they are nested; zero otherwise.
     pub resolution: [u32; 3],
     /// The bytes of the whole block.
     pub size: usize,
-    /// Bytes of nodes (BVH), or of cell words and runs (grid).
+    /// Bytes of nodes (BVH), or of cell words and runs (grid); those over instances included.
     pub structure_size: usize,
-    /// Bytes of leaf blocks: the primitives themselves.
+    /// Bytes of leaf blocks, the primitives themselves, and of instances.
     pub leaf_size: usize,
     /// Bytes of primitive ids.
     pub id_size: usize,
@@ -80,6 +96,9 @@ impl<'m> Accel<'m> {
     /// vertices make sense is not checked.
     pub fn open(block: &'m [u8]) -> Result<Self, OpenError> {
         let accel = Accel::recognise(block)?;
+        if accel.0.level().is_some_and(|level| level.is_linked()) {
+            return Err(OpenError::Linked);
+        }
         if accel.is_sound() { Ok(accel) } else { Err(OpenError::Corrupt) }
     }
 
@@ -102,72 +121,54 @@ impl<'m> Accel<'m> {
     }
 
     fn is_sound(&self) -> bool {
-        let Block { header, geometries, grids, nodes, bundles, words, runs, .. } = self.0.parts();
-        let leaves = self.leaves();
-        let no_grid = grids.is_empty() && words.is_empty() && runs.is_empty();
-        let no_nodes = nodes.is_empty();
-        let structure = match (header.kind, bundles) {
-            (KIND_LIST, Bundles::None) => no_grid && no_nodes,
-            (KIND_GRID, Bundles::None) => {
-                no_nodes && grid::grids_are_sound(grids, words, runs, &leaves)
-            }
-            (KIND_BVH, Bundles::None) => no_grid && bvh::tree_is_sound(nodes, &leaves),
-            (KIND_BVH, Bundles::Four(bundles)) => {
-                no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
-            }
-            (KIND_BVH, Bundles::Eight(bundles)) => {
-                no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
-            }
-            (KIND_BVH, Bundles::Sixteen(bundles)) => {
-                no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
-            }
-            _ => false,
-        };
-        let first_sphere =
-            geometries.get(header.mesh_count as usize).map_or(header.prim_limit, |g| g.first);
-        let numbered = header.mesh_count as usize <= geometries.len()
-            && header.triangle_limit == first_sphere
-            && first_sphere <= header.prim_limit;
-        let (triangles, prims) = (header.triangle_limit, header.prim_limit);
-        structure && numbered && prim::leaves_are_sound(&leaves, geometries, triangles, prims)
+        block_is_sound(&self.0.parts()) && self.0.level().is_none_or(|level| level_is_sound(&level))
     }
 
-    /// The block: what to copy, save or place in ROM.
+    /// The block: what to copy, save or place in ROM, unless it [is linked](Self::is_linked).
     pub fn block(&self) -> &'m [u8] {
         self.0.bytes()
     }
 
+    /// The ray in the object space of an instance, for which hits in it are exact: origin and direction are computed in `f64`
+    /// and rounded once. `None` when there is no such instance, or when it is not hit because the rounded ray leaves the range
+    /// of `f32` or has no direction.
+    pub fn object_ray(&self, instance: u32, ray: &Ray) -> Option<Ray> {
+        self.level()?.instances.get(instance as usize)?.object_ray(ray)
+    }
+
+    /// What belongs to its instances, if it has any.
+    pub(crate) fn level(&self) -> Option<Level<'m>> {
+        self.0.level()
+    }
+
+    /// Where its own primitives end, in bytes, if it has instances.
+    pub(crate) fn own_size(&self) -> usize {
+        self.0.header().level as usize * ALIGNMENT
+    }
+
+    /// Whether the block refers to the blocks of its instances, which stay where they are. Such a block can be queried, but
+    /// to be copied or saved it has to be [packed](Self::pack).
+    pub fn is_linked(&self) -> bool {
+        self.0.level().is_some_and(|level| level.is_linked())
+    }
+
     /// What the block holds.
     pub fn info(&self) -> Info {
-        let block = self.0.parts();
-        let Block { whole, header, grids, nodes, bundles, words, runs, .. } = block;
+        let own = info_of(&self.0.parts());
+        let Some(level) = self.0.level() else { return own };
+        let index = info_of(&level.index.parts());
         Info {
-            kind: match header.kind {
-                KIND_GRID => Kind::Grid,
-                KIND_BVH => Kind::Bvh,
-                _ => Kind::List,
-            },
-            layout: match bundles {
-                Bundles::None => Layout::Compact,
-                _ => Layout::Wide(header.layout),
-            },
-            lower: header.bounds.lower,
-            upper: header.bounds.upper,
-            triangle_count: header.triangle_count,
-            sphere_count: header.sphere_count,
-            ignored_count: header.ignored_count,
-            resolution: grids
-                .last()
-                .and_then(|grid| words.get(grid.first_word as usize))
-                .map_or([0; 3], |word| resolution(*word)),
-            size: whole.bytes().len(),
-            structure_size: size_of_val(grids)
-                + size_of_val(nodes)
-                + bundles.size()
-                + size_of_val(words)
-                + size_of_val(runs),
-            leaf_size: size_of_val(block.triangle_blocks) + size_of_val(block.sphere_blocks),
-            id_size: size_of_val(block.prim_ids),
+            kind: index.kind,
+            layout: index.layout,
+            lower: level.head.bounds.lower,
+            upper: level.head.bounds.upper,
+            instance_count: level.instances.len() as u32,
+            resolution: index.resolution,
+            size: own.size,
+            structure_size: own.structure_size + index.structure_size,
+            leaf_size: own.leaf_size + index.leaf_size + size_of_val(level.instances),
+            id_size: own.id_size + index.id_size,
+            ..own
         }
     }
 
@@ -178,12 +179,18 @@ impl<'m> Accel<'m> {
     /// and `t` is the nearest float to the real one, for all finite inputs.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        if self.0.has_level() {
+            return self.intersect_with(ray, &QueryOptions::default());
+        }
         trace::ask(self.0, ray, ClosestHit::<Exact, _, 1>::new(Choice::EVERYTHING, ()))
     }
 
     /// Whether anything is hit: true exactly when [`intersect`](Self::intersect) finds a hit.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
+        if self.0.has_level() {
+            return self.occluded_with(ray, &QueryOptions::default());
+        }
         trace::ask(self.0, ray, AnyHit::<Exact, _>::new(Choice::EVERYTHING, ()))
     }
 
@@ -213,6 +220,12 @@ impl<'m> Accel<'m> {
     pub fn intersect_batch_with(&self, rays: &[Ray], options: &QueryOptions, hits: &mut [Hit]) {
         let (block, choice) = (self.0, self.choice(options));
         let keep = |hit: Option<Hit>| hit.unwrap_or(Hit::MISS);
+        if block.has_level() {
+            for (ray, hit) in rays.iter().zip(hits) {
+                *hit = keep(self.intersect_with(ray, options));
+            }
+            return;
+        }
         match options.precision {
             Precision::Exact => {
                 // Many of them are in flight, so each had better be small.
@@ -230,6 +243,12 @@ impl<'m> Accel<'m> {
     pub fn occluded_batch_with(&self, rays: &[Ray], options: &QueryOptions, occluded: &mut [bool]) {
         let (block, choice) = (self.0, self.choice(options));
         let keep = |occluded| occluded;
+        if block.has_level() {
+            for (ray, occluded) in rays.iter().zip(occluded) {
+                *occluded = self.occluded_with(ray, options);
+            }
+            return;
+        }
         match options.precision {
             Precision::Exact => {
                 batch::ask_all(block, rays, occluded, AnyHit::<Exact, _>::new(choice, ()), keep);
@@ -264,6 +283,14 @@ impl<'m> Accel<'m> {
         watch: impl Watch,
     ) -> Option<Hit> {
         let (block, choice) = (self.0, self.choice(options));
+        if block.has_level() {
+            return match options.precision {
+                Precision::Exact => levels::closest::<Exact, _>(block, ray, options, watch),
+                Precision::Watertight => {
+                    levels::closest::<Watertight, _>(block, ray, options, watch)
+                }
+            };
+        }
         match options.precision {
             Precision::Exact => {
                 trace::ask(block, ray, ClosestHit::<Exact, _, 1>::new(choice, watch))
@@ -277,6 +304,12 @@ impl<'m> Accel<'m> {
     #[inline(always)]
     fn occluded_watched(&self, ray: &Ray, options: &QueryOptions, watch: impl Watch) -> bool {
         let (block, choice) = (self.0, self.choice(options));
+        if block.has_level() {
+            return match options.precision {
+                Precision::Exact => levels::any::<Exact, _>(block, ray, options, watch),
+                Precision::Watertight => levels::any::<Watertight, _>(block, ray, options, watch),
+            };
+        }
         match options.precision {
             Precision::Exact => trace::ask(block, ray, AnyHit::<Exact, _>::new(choice, watch)),
             Precision::Watertight => {
@@ -291,35 +324,119 @@ impl<'m> Accel<'m> {
     /// The block keeps no way from a primitive's number to its place, so this follows the ray once
     /// more: it costs about as much as the intersect call did.
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
-        let Hit { prim, geometry, instance, .. } = *hit;
-        let id = PrimId { prim, geometry, instance };
-        let Block { geometries, header, .. } = self.0.parts();
-        let number = flat_number(&id, geometries, header.prim_limit)?;
-        self.surface_of::<Exact>(ray, number, hit.t)
-            .or_else(|| self.surface_of::<Watertight>(ray, number, hit.t))
-    }
-
-    /// The surface at the hit with this flat number and `t` in one precision.
-    fn surface_of<D: Decide>(&self, ray: &Ray, number: u32, t: f32) -> Option<Surface> {
-        let found = trace::ask(self.0, ray, LocateHit::<D>::new(number, t))?;
-        let line = ray.line();
-        let (block, lane) = (found.place().block as usize, found.place().lane as usize);
-        let Block { header, triangle_blocks, sphere_blocks, .. } = self.0.parts();
-        if number < header.triangle_limit {
-            let corners = triangle_blocks.get(block)?.triangle(lane);
-            return Some(surface::of_triangle(&line, corners));
+        if hit.instance == NONE {
+            return spot_of(self.0, ray, hit).map(|spot| spot.surface());
         }
-        let (centre, radius) = sphere_blocks.get(block)?.sphere(lane);
-        Some(surface::of_sphere(&line, centre, radius, found.root()))
-    }
-
-    fn leaves(&self) -> Leaves<'m> {
-        Leaves::of(&self.0.parts())
+        let level = self.0.level()?;
+        let instance = level.instances.get(hit.instance as usize)?;
+        let spot = spot_of(level.child(instance)?, &instance.object_ray(ray)?, hit)?;
+        Some(spot.mapped(&instance.map()).surface())
     }
 
     #[inline(always)]
     fn choice(&self, options: &QueryOptions) -> Choice {
         let Block { header, geometries, .. } = self.0.parts();
-        Choice::new(options, geometries, header.prim_limit)
+        Choice::new(options, NONE, geometries, header.prim_limit)
     }
+}
+
+/// Whether what is not in instances can be traversed.
+fn block_is_sound(block: &Block) -> bool {
+    let Block { header, geometries, grids, nodes, bundles, words, runs, .. } = *block;
+    let leaves = Leaves::of(block);
+    let no_grid = grids.is_empty() && words.is_empty() && runs.is_empty();
+    let no_nodes = nodes.is_empty();
+    let structure = match (header.kind, bundles) {
+        (KIND_LIST, Bundles::None) => no_grid && no_nodes,
+        (KIND_GRID, Bundles::None) => {
+            no_nodes && grid::grids_are_sound(grids, words, runs, &leaves)
+        }
+        (KIND_BVH, Bundles::None) => no_grid && bvh::tree_is_sound(nodes, &leaves),
+        (KIND_BVH, Bundles::Four(bundles)) => {
+            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
+        }
+        (KIND_BVH, Bundles::Eight(bundles)) => {
+            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
+        }
+        (KIND_BVH, Bundles::Sixteen(bundles)) => {
+            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
+        }
+        _ => false,
+    };
+    let first_sphere =
+        geometries.get(header.mesh_count as usize).map_or(header.prim_limit, |g| g.first);
+    let numbered = header.mesh_count as usize <= geometries.len()
+        && header.triangle_limit == first_sphere
+        && first_sphere <= header.prim_limit;
+    let (triangles, prims) = (header.triangle_limit, header.prim_limit);
+    structure && numbered && prim::leaves_are_sound(&leaves, geometries, triangles, prims)
+}
+
+/// Whether the instances number what there is, their index can be traversed, and the children are there and can be too.
+fn level_is_sound(level: &Level) -> bool {
+    let index = level.index.parts();
+    let count = level.instances.len() as u32;
+    let children = level.head.child_count;
+    block_is_sound(&index)
+        && index.header.triangle_limit == 0
+        && index.header.prim_limit == count
+        && level.instances.iter().all(|instance| instance.child < children)
+        && level.are_packed(|child| block_is_sound(&child.parts()))
+}
+
+/// What a block holds outside instances.
+fn info_of(block: &Block) -> Info {
+    let Block { whole, header, grids, nodes, bundles, words, runs, .. } = *block;
+    Info {
+        kind: match header.kind {
+            KIND_GRID => Kind::Grid,
+            KIND_BVH => Kind::Bvh,
+            _ => Kind::List,
+        },
+        layout: match bundles {
+            Bundles::None => Layout::Compact,
+            _ => Layout::Wide(header.layout),
+        },
+        lower: header.bounds.lower,
+        upper: header.bounds.upper,
+        triangle_count: header.triangle_count,
+        sphere_count: header.sphere_count,
+        instance_count: 0,
+        ignored_count: header.ignored_count,
+        resolution: grids
+            .last()
+            .and_then(|grid| words.get(grid.first_word as usize))
+            .map_or([0; 3], |word| resolution(*word)),
+        size: whole.bytes().len(),
+        structure_size: size_of_val(grids)
+            + size_of_val(nodes)
+            + bundles.size()
+            + size_of_val(words)
+            + size_of_val(runs),
+        leaf_size: size_of_val(block.triangle_blocks) + size_of_val(block.sphere_blocks),
+        id_size: size_of_val(block.prim_ids),
+    }
+}
+
+/// The point of a hit outside instances, in either precision.
+fn spot_of(block: Finished, ray: &Ray, hit: &Hit) -> Option<Spot> {
+    let Hit { prim, geometry, instance, .. } = *hit;
+    let id = PrimId { prim, geometry, instance };
+    let Block { geometries, header, .. } = block.parts();
+    let number = flat_number(&id, geometries, header.prim_limit)?;
+    spot_in::<Exact>(block, ray, number, hit.t)
+        .or_else(|| spot_in::<Watertight>(block, ray, number, hit.t))
+}
+
+/// The point of the hit with this flat number and `t` in one precision.
+fn spot_in<D: Decide>(whole: Finished, ray: &Ray, number: u32, t: f32) -> Option<Spot> {
+    let found = trace::ask(whole, ray, LocateHit::<D>::new(number, t))?;
+    let line = ray.line();
+    let (block, lane) = (found.place().block as usize, found.place().lane as usize);
+    let Block { header, triangle_blocks, sphere_blocks, .. } = whole.parts();
+    if number < header.triangle_limit {
+        return Some(Spot::on_triangle(&line, triangle_blocks.get(block)?.triangle(lane)));
+    }
+    let (centre, radius) = sphere_blocks.get(block)?.sphere(lane);
+    Some(Spot::on_sphere(&line, centre, radius, found.root()))
 }

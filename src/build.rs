@@ -10,7 +10,9 @@ use crate::caller::{Caller, Threads};
 use crate::choice::suits_grid;
 use crate::error::{BuildError, Unsupported};
 use crate::grid::{self, GridKind, GridOptions};
+use crate::instance::{Placed, fixed_size, write};
 use crate::list;
+use crate::math::Aabb;
 use crate::prim::{Survey, survey};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT};
@@ -107,7 +109,7 @@ pub fn grid_needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, Build
 /// finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
 /// written, unless the build was cancelled.
 pub fn build_bvh<'m>(
-    scene: &Scene,
+    scene: &Scene<'_, 'm>,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
@@ -123,7 +125,7 @@ pub fn build_bvh<'m>(
 /// cell. The finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
 /// written.
 pub fn build_grid<'m>(
-    scene: &Scene,
+    scene: &Scene<'_, 'm>,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
@@ -138,7 +140,7 @@ pub fn needs(scene: &Scene, options: &BuildOptions) -> Result<Memory, BuildError
 /// Builds at the front of `memory` what is likely to take the least time over `scene`, building it and tracing
 /// [`rays_per_prim`](BuildOptions::rays_per_prim): a list, a grid or a BVH. All else as [`build_bvh`] and [`build_grid`].
 pub fn build<'m>(
-    scene: &Scene,
+    scene: &Scene<'_, 'm>,
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
@@ -158,29 +160,41 @@ pub(crate) enum Structure {
 }
 
 /// A build that was checked and sized, but not begun.
-pub(crate) struct Job<'s, 'a> {
-    scene: &'s Scene<'a>,
-    survey: Survey,
-    census: Census,
-    structure: Structure,
+pub(crate) struct Job<'s> {
+    scene: &'s Scene<'s, 's>,
     options: &'s BuildOptions<'s>,
+    own: Plan,
+    level: Option<LevelPlan<'s>>,
     pub memory: Memory,
 }
 
-impl<'s, 'a> Job<'s, 'a> {
-    pub fn new(
-        scene: &'s Scene<'a>,
-        options: &'s BuildOptions<'s>,
+/// One structure: what is known of its primitives, what it is to be, and the bytes that takes at best and at least.
+struct Plan {
+    survey: Survey,
+    census: Census,
+    structure: Structure,
+    size: usize,
+    minimum: usize,
+}
+
+/// The instances of a scene, and the index over them.
+struct LevelPlan<'s> {
+    placed: Placed<'s>,
+    index: Plan,
+    /// The bytes of all that is not the index.
+    fixed: usize,
+}
+
+impl Plan {
+    /// A plan for `asked`; up to `handful` primitives become a list.
+    fn new(
+        scene: &Scene,
+        options: &BuildOptions,
         asked: Structure,
+        handful: u32,
     ) -> Result<Self, BuildError> {
-        options.check()?;
         let survey = survey(scene)?;
         let census = Census::take(scene, &survey, &Caller::new(options.threads, None))?;
-        let handful = match options.plain_list {
-            PlainList::Automatic => list::HANDFUL,
-            PlainList::Never => 0,
-            PlainList::Always => u32::MAX,
-        };
         let structure = match asked {
             _ if census.hittable() <= handful => Structure::List,
             Structure::Automatic if suits_grid(scene, &census, options.rays_per_prim) => {
@@ -195,8 +209,79 @@ impl<'s, 'a> Job<'s, 'a> {
             Structure::Bvh | Structure::Automatic => bvh::needs(&survey, &census)?,
             Structure::Wide(width) => bvh::needs_wide(&survey, &census, width)?,
         };
+        Ok(Plan { survey, census, structure, size, minimum })
+    }
+
+    /// Builds into zero bytes, aligned and at least the minimum; returns the size of the block.
+    fn run(
+        &self,
+        scene: &Scene,
+        options: &BuildOptions,
+        caller: &Caller,
+        bytes: &mut [u8],
+    ) -> Result<usize, BuildError> {
+        let Plan { survey, census, .. } = self;
+        let effort = match options.quality {
+            Quality::Fast => Effort::FAST,
+            Quality::Balanced => Effort::BALANCED,
+            Quality::Best => Effort::BEST,
+        };
+        let how = How { effort, caller };
+        match self.structure {
+            Structure::List => list::build(scene, survey, census, bytes),
+            Structure::Grid(grid) => grid::build(scene, survey, census, &grid, bytes),
+            Structure::Bvh | Structure::Automatic => bvh::build(scene, survey, census, &how, bytes),
+            Structure::Wide(width) => bvh::build_wide(scene, survey, census, width, &how, bytes),
+        }
+    }
+}
+
+impl<'s> LevelPlan<'s> {
+    /// The plan for the instances of a scene; `bounds` is the box around all else in it. The index is of the structure that
+    /// the scene's own primitives were to be, though it is seldom chosen for them; a list only if that was asked for.
+    fn new(
+        scene: &'s Scene<'s, 's>,
+        options: &BuildOptions,
+        asked: Structure,
+        bounds: Aabb,
+    ) -> Result<Self, BuildError> {
+        let placed = Placed::new(scene, bounds)?;
+        let asked = if asked == Structure::Automatic { options.bvh() } else { asked };
+        let handful = if options.plain_list == PlainList::Always { u32::MAX } else { 0 };
+        let index = Plan::new(&Scene::of_boxes(&placed), options, asked, handful)?;
+        let fixed = fixed_size(scene.instance_count()).ok_or(BuildError::TooLarge)?;
+        Ok(LevelPlan { placed, index, fixed })
+    }
+}
+
+impl<'s> Job<'s> {
+    pub fn new(
+        scene: &'s Scene<'s, 's>,
+        options: &'s BuildOptions<'s>,
+        asked: Structure,
+    ) -> Result<Self, BuildError> {
+        options.check()?;
+        let handful = match options.plain_list {
+            PlainList::Automatic => list::HANDFUL,
+            PlainList::Never => 0,
+            PlainList::Always => u32::MAX,
+        };
+        let own = Plan::new(scene, options, asked, handful)?;
+        let level = match scene.instance_count() {
+            0 => None,
+            _ => Some(LevelPlan::new(scene, options, asked, own.census.bounds)?),
+        };
+        let sum = |own: usize, index: fn(&Plan) -> usize| match &level {
+            None => Some(own),
+            Some(LevelPlan { index: plan, fixed, .. }) => {
+                own.checked_add(*fixed)?.checked_add(index(plan))
+            }
+        };
+        let size = sum(own.size, |plan| plan.size).filter(|size| isize::try_from(*size).is_ok());
+        let size = size.ok_or(BuildError::TooLarge)?;
+        let minimum = sum(own.minimum, |plan| plan.minimum).ok_or(BuildError::TooLarge)?;
         let memory = Memory { size, minimum, alignment: ALIGNMENT };
-        Ok(Job { scene, survey, census, structure, options, memory })
+        Ok(Job { scene, options, own, level, memory })
     }
 
     /// Builds into memory that may hold anything.
@@ -215,25 +300,34 @@ impl<'s, 'a> Job<'s, 'a> {
     /// Builds into zero bytes, aligned and at least the minimum.
     pub fn run<'m>(&self, bytes: &'m mut [u8]) -> Result<Accel<'m>, BuildError> {
         let minimum = self.memory.minimum;
-        let Job { scene, survey, census, options, .. } = self;
+        let Job { scene, options, own, level, .. } = self;
         let caller = Caller::new(options.threads, options.progress);
         caller.done(0.0).ok_or(BuildError::Cancelled)?;
-        let effort = match options.quality {
-            Quality::Fast => Effort::FAST,
-            Quality::Balanced => Effort::BALANCED,
-            Quality::Best => Effort::BEST,
-        };
-        let how = How { effort, caller: &caller };
-        let built = match self.structure {
-            Structure::List => list::build(scene, survey, census, bytes),
-            Structure::Grid(grid) => grid::build(scene, survey, census, &grid, bytes),
-            Structure::Bvh | Structure::Automatic => bvh::build(scene, survey, census, &how, bytes),
-            Structure::Wide(width) => bvh::build_wide(scene, survey, census, width, &how, bytes),
-        };
+        // The index takes what it wants, as long as that leaves the least for the own primitives.
+        let kept = level.as_ref().map_or(0, |level| level.fixed + level.index.size);
+        let room = bytes.len().saturating_sub(kept).clamp(own.minimum, own.size).min(bytes.len());
+        let room = room / ALIGNMENT * ALIGNMENT;
+        let built = own.run(scene, options, &caller, &mut bytes[..room]);
         caller.done(1.0).ok_or(BuildError::Cancelled)?;
-        built?;
+        if let Some(level) = level {
+            level.run(options, built?, bytes).ok_or(BuildError::OutOfMemory { minimum })?;
+        } else {
+            built?;
+        }
         // A block that was just sealed is always recognised, so this error does not arise.
         Accel::recognise(bytes).map_err(|_| BuildError::OutOfMemory { minimum })
+    }
+}
+
+impl LevelPlan<'_> {
+    /// Builds behind the own primitives, which end at byte `own`; returns the size of the block.
+    fn run(&self, options: &BuildOptions, own: usize, bytes: &mut [u8]) -> Option<usize> {
+        let LevelPlan { placed, index, .. } = self;
+        write(placed, own, bytes, |rest| {
+            let room = rest.len().min(index.size);
+            let caller = Caller::new(options.threads, None);
+            index.run(&Scene::of_boxes(placed), options, &caller, rest.get_mut(..room)?).ok()
+        })
     }
 }
 

@@ -33,6 +33,16 @@ pub enum BuildError {
         /// The width asked for.
         width: u32,
     },
+    /// The map of an instance is not finite, or flattens space: it has no inverse.
+    SingularInstance {
+        /// The instance.
+        instance: u32,
+    },
+    /// The accel of an instance has instances itself: there are two levels.
+    NestedInstance {
+        /// The instance.
+        instance: u32,
+    },
     /// The caller's progress callback said to stop. The memory holds no structure and may be used again.
     Cancelled,
     /// The option is part of the interface but not of this version.
@@ -65,6 +75,8 @@ pub enum OpenError {
     Layout,
     /// The contents contradict themselves.
     Corrupt,
+    /// The block refers to other blocks by address: it has to be packed before it is copied or saved.
+    Linked,
 }
 
 impl fmt::Display for BuildError {
@@ -83,6 +95,12 @@ impl fmt::Display for BuildError {
             BuildError::TooLarge => f.write_str("the scene is too large to be numbered or stored"),
             BuildError::NoSuchLayout { width } => {
                 write!(f, "there are no bundles of {width} lanes: 4, 8 or 16")
+            }
+            BuildError::SingularInstance { instance } => {
+                write!(f, "the map of instance {instance} has no inverse or is not finite")
+            }
+            BuildError::NestedInstance { instance } => {
+                write!(f, "the accel of instance {instance} has instances itself")
             }
             BuildError::Cancelled => f.write_str("the caller cancelled the build"),
             BuildError::Unsupported(what) => write!(f, "this version cannot build it: {what}"),
@@ -108,6 +126,7 @@ impl fmt::Display for OpenError {
             OpenError::Truncated => "the block is longer than the bytes given",
             OpenError::Layout => "this build of the library leaves out the block's layout",
             OpenError::Corrupt => "the block's contents contradict themselves",
+            OpenError::Linked => "the block refers to other blocks by address and was not packed",
         })
     }
 }

@@ -1,5 +1,7 @@
 //! A built structure in memory of its own: the outer shell, and the only place that allocates.
 
+use core::marker::PhantomData;
+
 use crate::accel::Accel;
 use crate::build::{BuildOptions, Job, Structure};
 use crate::error::BuildError;
@@ -25,38 +27,49 @@ impl crate::caller::Threads for Rayon {
 
 /// A built structure in memory of its own.
 ///
-/// The scratch memory is given back after the build.
-pub struct OwnedAccel {
+/// The scratch memory is given back after the build. What is built over instances borrows their accels for `'c`; all else
+/// borrows nothing.
+pub struct OwnedAccel<'c> {
     memory: AlignedMemory,
+    children: PhantomData<&'c [u8]>,
 }
 
-impl OwnedAccel {
+impl OwnedAccel<'_> {
     /// Builds a BVH; see [`build_bvh`](crate::build_bvh).
-    pub fn bvh(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
+    pub fn bvh<'c>(
+        scene: &Scene<'_, 'c>,
+        options: &BuildOptions,
+    ) -> Result<OwnedAccel<'c>, BuildError> {
         Self::build(scene, options, options.bvh())
     }
 
     /// Builds a grid; see [`build_grid`](crate::build_grid).
-    pub fn grid(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
+    pub fn grid<'c>(
+        scene: &Scene<'_, 'c>,
+        options: &BuildOptions,
+    ) -> Result<OwnedAccel<'c>, BuildError> {
         Self::build(scene, options, Structure::Grid(options.grid))
     }
 
     /// Builds what suits the scene; see [`build`](crate::build()).
-    pub fn automatic(scene: &Scene, options: &BuildOptions) -> Result<Self, BuildError> {
+    pub fn automatic<'c>(
+        scene: &Scene<'_, 'c>,
+        options: &BuildOptions,
+    ) -> Result<OwnedAccel<'c>, BuildError> {
         Self::build(scene, options, Structure::Automatic)
     }
 
-    fn build(
-        scene: &Scene,
+    fn build<'c>(
+        scene: &Scene<'_, 'c>,
         options: &BuildOptions,
         structure: Structure,
-    ) -> Result<Self, BuildError> {
+    ) -> Result<OwnedAccel<'c>, BuildError> {
         let job = Job::new(scene, options, structure)?;
         let size = job.memory.size;
         let memory = AlignedMemory::new(size);
         let mut memory = memory.ok_or(BuildError::OutOfMemory { minimum: size })?;
         let used = job.run(memory.bytes_mut())?.block().len();
-        Ok(OwnedAccel { memory: memory.shrunk(used) })
+        Ok(OwnedAccel { memory: memory.shrunk(used), children: PhantomData })
     }
 
     /// The structure. Cheap, but not free: keep the view while tracing.

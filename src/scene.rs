@@ -1,4 +1,7 @@
-//! What a build reads: meshes and sphere sets that stay the caller's.
+//! What a build reads: meshes, sphere sets and instances that stay the caller's.
+
+use crate::block::Finished;
+use crate::math::Aabb;
 
 /// Elements of a few words each, at equal distances in the caller's memory.
 ///
@@ -162,69 +165,161 @@ impl<'a> SphereSet<'a> {
     }
 }
 
-/// Everything that can be hit. Either list may be empty.
-///
-/// Geometries are numbered: the meshes first, then the sphere sets.
+/// A built structure at another place: [`Instance::new`](crate::Instance::new).
 #[derive(Clone, Copy)]
-pub struct Scene<'a>(Source<'a>);
+pub struct Instance<'c> {
+    pub(crate) child: Finished<'c>,
+    pub(crate) object_to_world: [f32; 12],
+    pub(crate) mask: u32,
+}
+
+impl Instance<'_> {
+    /// The same instance, seen only by queries whose mask shares a bit with `mask`; 0: by all. What is in it has
+    /// masks of its own, and is seen if both are.
+    pub fn with_mask(self, mask: u32) -> Self {
+        Instance { mask, ..self }
+    }
+}
+
+/// Everything that can be hit. Any list may be empty.
+///
+/// Geometries are numbered: the meshes first, then the sphere sets. Instances have numbers of their own, and what is in
+/// them is numbered as in the accel that stands there.
+///
+/// A build reads meshes and sphere sets, and forgets them; but what it makes of instances goes on to refer to their accels,
+/// for `'c`.
+#[derive(Clone, Copy)]
+pub struct Scene<'a, 'c> {
+    source: Source<'a>,
+    instances: Instances<'a, 'c>,
+}
 
 /// Where the geometries come from: slices, or arrays in another language's types that are read
 /// element by element.
 #[derive(Clone, Copy)]
 enum Source<'a> {
-    Slices { meshes: &'a [Mesh<'a>], sphere_sets: &'a [SphereSet<'a>] },
-    Foreign(&'a dyn Geometries<'a>),
+    Slices {
+        meshes: &'a [Mesh<'a>],
+        sphere_sets: &'a [SphereSet<'a>],
+    },
+    Foreign(&'a (dyn Geometries + 'a)),
+    /// What an index over instances is built of; one geometry.
+    Boxes(&'a (dyn Boxes + 'a)),
+}
+
+#[derive(Clone, Copy)]
+enum Instances<'a, 'c> {
+    Slice(&'a [Instance<'c>]),
+    Foreign(&'c (dyn Placements + 'c)),
 }
 
 /// Geometries that are made when they are asked for, on any thread of a build.
-pub(crate) trait Geometries<'a>: Sync {
+pub(crate) trait Geometries: Sync {
     fn mesh_count(&self) -> usize;
-    fn mesh(&self, i: usize) -> Option<Mesh<'a>>;
+    fn mesh(&self, i: usize) -> Option<Mesh<'_>>;
     fn sphere_set_count(&self) -> usize;
-    fn sphere_set(&self, i: usize) -> Option<SphereSet<'a>>;
+    fn sphere_set(&self, i: usize) -> Option<SphereSet<'_>>;
 }
 
-impl<'a> Scene<'a> {
+/// Instances that are made when they are asked for.
+pub(crate) trait Placements: Sync {
+    fn instance_count(&self) -> usize;
+    fn instance(&self, i: usize) -> Option<Instance<'_>>;
+}
+
+/// Boxes that are made when they are asked for, on any thread of a build.
+pub(crate) trait Boxes: Sync {
+    fn count(&self) -> usize;
+    /// The box of this number, empty if there is nothing in it.
+    fn aabb(&self, i: usize) -> Aabb;
+}
+
+impl<'a, 'c> Scene<'a, 'c> {
     /// A scene of these meshes and sphere sets.
     pub const fn new(meshes: &'a [Mesh<'a>], sphere_sets: &'a [SphereSet<'a>]) -> Self {
-        Scene(Source::Slices { meshes, sphere_sets })
+        let source = Source::Slices { meshes, sphere_sets };
+        Scene { source, instances: Instances::Slice(&[]) }
     }
 
-    /// A scene whose geometries are made when they are asked for.
+    /// The same scene with these instances in place of others.
+    pub const fn with_instances<'i>(self, instances: &'i [Instance<'c>]) -> Scene<'i, 'c>
+    where
+        'a: 'i,
+    {
+        Scene { source: self.source, instances: Instances::Slice(instances) }
+    }
+
+    /// A scene whose geometries and instances are made when they are asked for.
     #[cfg_attr(not(feature = "capi"), expect(dead_code, reason = "only the C face needs it"))]
-    pub(crate) const fn foreign(geometries: &'a dyn Geometries<'a>) -> Self {
-        Scene(Source::Foreign(geometries))
+    pub(crate) const fn foreign(
+        geometries: &'a (dyn Geometries + 'a),
+        instances: &'c (dyn Placements + 'c),
+    ) -> Self {
+        Scene { source: Source::Foreign(geometries), instances: Instances::Foreign(instances) }
+    }
+
+    /// A scene of boxes.
+    pub(crate) const fn of_boxes(boxes: &'a (dyn Boxes + 'a)) -> Self {
+        Scene { source: Source::Boxes(boxes), instances: Instances::Slice(&[]) }
     }
 
     /// The number of meshes.
     pub fn mesh_count(&self) -> usize {
-        match self.0 {
+        match self.source {
             Source::Slices { meshes, .. } => meshes.len(),
             Source::Foreign(geometries) => geometries.mesh_count(),
+            Source::Boxes(_) => 0,
         }
     }
 
     /// Mesh `i`, or `None` beyond the last one.
     pub fn mesh(&self, i: usize) -> Option<Mesh<'a>> {
-        match self.0 {
+        match self.source {
             Source::Slices { meshes, .. } => meshes.get(i).copied(),
             Source::Foreign(geometries) => geometries.mesh(i),
+            Source::Boxes(_) => None,
         }
     }
 
     /// The number of sphere sets.
     pub fn sphere_set_count(&self) -> usize {
-        match self.0 {
+        match self.source {
             Source::Slices { sphere_sets, .. } => sphere_sets.len(),
             Source::Foreign(geometries) => geometries.sphere_set_count(),
+            Source::Boxes(_) => 0,
         }
     }
 
     /// Sphere set `i`, or `None` beyond the last one.
     pub fn sphere_set(&self, i: usize) -> Option<SphereSet<'a>> {
-        match self.0 {
+        match self.source {
             Source::Slices { sphere_sets, .. } => sphere_sets.get(i).copied(),
             Source::Foreign(geometries) => geometries.sphere_set(i),
+            Source::Boxes(_) => None,
+        }
+    }
+
+    /// The number of instances.
+    pub fn instance_count(&self) -> usize {
+        match self.instances {
+            Instances::Slice(instances) => instances.len(),
+            Instances::Foreign(instances) => instances.instance_count(),
+        }
+    }
+
+    /// Instance `i`, or `None` beyond the last one.
+    pub fn instance(&self, i: usize) -> Option<Instance<'c>> {
+        match self.instances {
+            Instances::Slice(instances) => instances.get(i).copied(),
+            Instances::Foreign(instances) => instances.instance(i),
+        }
+    }
+
+    /// The boxes, if it is a scene of boxes.
+    pub(crate) fn boxes(&self) -> Option<&'a (dyn Boxes + 'a)> {
+        match self.source {
+            Source::Boxes(boxes) => Some(boxes),
+            _ => None,
         }
     }
 }

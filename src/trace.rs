@@ -8,7 +8,7 @@ use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
 use crate::query::{
-    Any, Choice, Closest, Decide, Exact, Filter, Locate, Meets, Query, Watch, geometry_of,
+    Any, Choice, Closest, Decide, Exact, ExactMet, Filter, Locate, Meets, Query, Watch, geometry_of,
 };
 use crate::ray::{Hit, Interval, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
@@ -200,7 +200,30 @@ impl<'m, D: Decide> Question<'m> for LocateHit<D> {
     }
 }
 
-/// The answer to `question` for one ray.
+/// The meeting that wins: what [`ClosestHit`] answers before it is written down. Asked when meetings in two instances are too
+/// close for floats.
+#[derive(Clone, Copy)]
+pub(crate) struct ClosestMet(pub Choice);
+
+impl<'m> Question<'m> for ClosestMet {
+    type Query = Closest<'m, Exact, (), 1>;
+    type Answer = Option<ExactMet>;
+    const RARE: bool = true;
+
+    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
+        Closest::new(Filter::new(self.0, block.geometries, block.prim_ids), t_max, ())
+    }
+
+    fn answer(_: &Block, _: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
+        query.best
+    }
+
+    fn nothing() -> Self::Answer {
+        None
+    }
+}
+
+/// The answer to `question` for one ray, without what is in instances.
 #[inline(always)]
 pub(crate) fn ask<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
     let ask = Ask { block, ray, question };
@@ -265,7 +288,7 @@ fn record(block: &Block, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
 
 /// Offers `query` what the ray meets, by the one traversal of the structure at hand.
 #[inline(always)]
-fn trace<S: Simd, Q: Query>(
+pub(crate) fn trace<S: Simd, Q: Query>(
     s: S,
     block: &Block,
     ray: &mut impl Late,

@@ -9,13 +9,14 @@ use std::path::{Path, PathBuf};
 const HOUSE: &[(&str, &[&str])] = &[
     ("math", &[]),
     ("error", &[]),
-    ("scene", &[]),
     ("storage", &[]),
     ("simd", &[]),
     ("caller", &[]),
     ("exact", &["math"]),
     ("ray", &["exact", "math", "simd"]),
     ("block", &["error", "math", "storage"]),
+    ("scene", &["block", "math"]),
+    ("instance", &["block", "error", "exact", "math", "ray", "scene"]),
     ("interval", &["exact", "math"]),
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
@@ -31,20 +32,25 @@ const HOUSE: &[(&str, &[&str])] = &[
         "bvh",
         &["block", "caller", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"],
     ),
-    ("surface", &["exact", "interval", "math"]),
+    ("surface", &["exact", "instance", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
+    ("levels", &["block", "instance", "math", "prim", "query", "ray", "simd", "trace"]),
     (
         "accel",
-        &["batch", "block", "bvh", "error", "grid", "prim", "query", "ray", "surface", "trace"],
+        &[
+            "batch", "block", "bvh", "error", "grid", "instance", "levels", "prim", "query", "ray",
+            "scene", "storage", "surface", "trace",
+        ],
     ),
     (
         "build",
         &[
-            "accel", "block", "bvh", "caller", "choice", "error", "grid", "list", "prim", "scene",
-            "storage",
+            "accel", "block", "bvh", "caller", "choice", "error", "grid", "instance", "list",
+            "math", "prim", "scene", "storage",
         ],
     ),
+    ("pack", &["accel", "block", "build", "error", "storage"]),
     ("owned", &["accel", "build", "caller", "error", "scene", "storage"]),
     (
         "capi",

@@ -46,7 +46,7 @@ fn same_in_all(model: &Model, rays: &[Ray]) -> usize {
 }
 
 /// A mesh of more bytes than are near, with others in front of it.
-fn far(meshes: &[TriangleMesh]) -> OwnedAccel {
+fn far(meshes: &[TriangleMesh]) -> OwnedAccel<'static> {
     let mut large = make::sphere(600_000);
     large.vertices.iter_mut().for_each(|v| v[0] += 100.0);
     let meshes: Vec<Mesh> = meshes

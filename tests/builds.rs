@@ -182,7 +182,7 @@ fn with_open(block: &[u8], f: impl FnOnce(&Accel)) {
     f(&Accel::open(&memory[start..start + block.len()]).expect("a sound block"));
 }
 
-type Build = fn(&Scene, &BuildOptions) -> Result<OwnedAccel, BuildError>;
+type Build = for<'c> fn(&Scene<'_, 'c>, &BuildOptions) -> Result<OwnedAccel<'c>, BuildError>;
 
 #[test]
 fn progress_is_told_and_may_cancel() {

@@ -20,7 +20,7 @@ pub fn join(lineup: &mut Lineup, model: &Model) -> Result<()> {
     Ok(())
 }
 
-struct Face(OwnedAccel);
+struct Face(OwnedAccel<'static>);
 
 impl Tracer for Face {
     fn closest(&self, rays: &[Ray], hits: &mut [Hit], _coherent: bool, watch: &mut Watch) {

@@ -51,22 +51,26 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) -> Result<()>
 }
 
 /// A BVH, or for a handful of triangles the list that stands in for it.
-pub fn bvh(model: &Model, layout: Layout) -> Result<OwnedAccel, BuildError> {
+pub fn bvh(model: &Model, layout: Layout) -> Result<OwnedAccel<'static>, BuildError> {
     bvh_of(model, layout, Quality::Balanced)
 }
 
-fn bvh_of(model: &Model, layout: Layout, quality: Quality) -> Result<OwnedAccel, BuildError> {
+fn bvh_of(
+    model: &Model,
+    layout: Layout,
+    quality: Quality,
+) -> Result<OwnedAccel<'static>, BuildError> {
     let options = BuildOptions { layout, quality, ..BuildOptions::default() };
     model.with_scene(|scene| OwnedAccel::bvh(scene, &options))
 }
 
 /// No structure at all: what every other answer must equal.
-pub fn list(model: &Model) -> Result<OwnedAccel, BuildError> {
+pub fn list(model: &Model) -> Result<OwnedAccel<'static>, BuildError> {
     let options = BuildOptions { plain_list: PlainList::Always, ..BuildOptions::default() };
     model.with_scene(|scene| OwnedAccel::bvh(scene, &options))
 }
 
-fn add_bvh(lineup: &mut Lineup, name: &str, accel: &Rc<OwnedAccel>) {
+fn add_bvh(lineup: &mut Lineup, name: &str, accel: &Rc<OwnedAccel<'static>>) {
     let (exact, watertight) = (Precision::Exact, Precision::Watertight);
     lineup.add(name, Class::Single(exact), Single::new(accel, exact));
     lineup.add(format!("{name} again"), Class::Noise, Single::new(accel, exact));
@@ -77,12 +81,12 @@ fn add_bvh(lineup: &mut Lineup, name: &str, accel: &Rc<OwnedAccel>) {
 
 /// One call a ray.
 struct Single {
-    accel: Rc<OwnedAccel>,
+    accel: Rc<OwnedAccel<'static>>,
     options: QueryOptions,
 }
 
 impl Single {
-    fn new(accel: &Rc<OwnedAccel>, precision: Precision) -> Self {
+    fn new(accel: &Rc<OwnedAccel<'static>>, precision: Precision) -> Self {
         let options = QueryOptions { precision, ..QueryOptions::default() };
         Single { accel: accel.clone(), options }
     }
@@ -120,7 +124,7 @@ pub fn each<A>(rays: &[Ray], answers: &mut [A], ask: impl Fn(&Ray) -> A) {
 }
 
 /// One call for all rays.
-struct Batch(Rc<OwnedAccel>);
+struct Batch(Rc<OwnedAccel<'static>>);
 
 impl Tracer for Batch {
     fn closest(&self, rays: &[Ray], hits: &mut [Hit], _coherent: bool, watch: &mut Watch) {

@@ -88,7 +88,7 @@ const LEAST_RUN: Duration = Duration::from_secs(2);
 struct Bench<'a> {
     scene: &'a RenderScene,
     camera: &'a Camera,
-    built: &'a [OwnedAccel],
+    built: &'a [OwnedAccel<'a>],
     order: Vec<u32>,
     bar: ProgressBar,
 }
@@ -138,7 +138,11 @@ pub fn scene(subject: &Subject, options: &Options, deadline: Instant) -> Result<
 }
 
 /// Builds once, and again while that costs little, for the time it takes.
-fn build(scene: &RenderScene, structure: Structure, runs: u32) -> Result<(OwnedAccel, Vec<f64>)> {
+fn build(
+    scene: &RenderScene,
+    structure: Structure,
+    runs: u32,
+) -> Result<(OwnedAccel<'static>, Vec<f64>)> {
     let once = || {
         let start = Instant::now();
         let accel = scene.model.with_scene(|s| structure.build(s));

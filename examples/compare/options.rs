@@ -68,7 +68,7 @@ impl Structure {
     }
 
     /// Builds it over `scene`, however small that is.
-    pub fn build(self, scene: &Scene) -> Result<OwnedAccel, BuildError> {
+    pub fn build<'c>(self, scene: &Scene<'_, 'c>) -> Result<OwnedAccel<'c>, BuildError> {
         let plain_list = match self {
             Structure::List => PlainList::Always,
             Structure::Automatic => PlainList::Automatic,

@@ -22,12 +22,16 @@ pub struct Model {
 
 impl Model {
     /// Calls `f` with the scene that borrows this model.
-    pub fn with_scene<R>(&self, f: impl FnOnce(&Scene) -> R) -> R {
+    pub fn with_scene<R>(&self, f: impl FnOnce(&Scene<'_, 'static>) -> R) -> R {
         self.with_masked_scene(&[], f)
     }
 
     /// The same with mask `masks[i]` on geometry `i`; missing ones are 0.
-    pub fn with_masked_scene<R>(&self, masks: &[u32], f: impl FnOnce(&Scene) -> R) -> R {
+    pub fn with_masked_scene<R>(
+        &self,
+        masks: &[u32],
+        f: impl FnOnce(&Scene<'_, 'static>) -> R,
+    ) -> R {
         let mut masks = masks.iter().copied().chain(std::iter::repeat(0));
         let mut next = || masks.next().unwrap_or(0);
         let meshes: Vec<Mesh> = (self.meshes.iter())

@@ -23,8 +23,8 @@ fn scene(name: &str) -> Option<(RenderScene, PathBuf)> {
 }
 
 /// A grid and a BVH over the whole scene, however small it is.
-fn structures(scene: &RenderScene) -> [OwnedAccel; 2] {
-    type Build = fn(&Scene, &BuildOptions) -> Result<OwnedAccel, BuildError>;
+fn structures(scene: &RenderScene) -> [OwnedAccel<'static>; 2] {
+    type Build = for<'c> fn(&Scene<'_, 'c>, &BuildOptions) -> Result<OwnedAccel<'c>, BuildError>;
     let options = BuildOptions { plain_list: PlainList::Never, ..Default::default() };
     [OwnedAccel::grid as Build, OwnedAccel::bvh].map(|build| {
         scene.model.with_scene(|s| build(s, &options)).expect("a scene that can be built")

@@ -2,17 +2,18 @@
 //!
 //! ```text
 //! | header | geometries | prim_ids | grids | nodes | bundles | words |
-//! | sphere blocks | triangle blocks | runs |
+//! | sphere blocks | triangle blocks | runs | instances ..
 //! ```
 //!
 //! Every part starts at a multiple of 64 bytes and is empty in blocks that have no use for it. There
 //! are no pointers and no stored offsets: the counts in the header say where each part is, so a
 //! block can be copied, written to a file or placed in ROM. The order lets a build finish a part
-//! before it must know the size of the next.
+//! before it must know the size of the next. What follows in a block with instances is drawn in [`level`].
 
 pub(crate) mod bundle;
 pub(crate) mod cells;
 pub(crate) mod leaf;
+pub(crate) mod level;
 mod node;
 mod view;
 
@@ -26,12 +27,12 @@ use cells::{GridHead, Run};
 use leaf::{SphereBlock, TriangleBlock};
 
 use crate::math::Aabb;
-use crate::storage::{self, Plain, align_up};
+use crate::storage::{self, ALIGNMENT, Plain, align_up};
 
 const MAGIC: [u8; 8] = *b"raykern\0";
 const BYTE_ORDER: u32 = 0x0102_0304;
 /// Counted up whenever the bytes of a block change their meaning.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 pub(crate) const KIND_LIST: u32 = 1;
 pub(crate) const KIND_GRID: u32 = 2;
@@ -62,9 +63,9 @@ pub(crate) struct Counts {
 /// byte 0        8            12        16     24     28       32      56
 ///      | magic | byte order | version | size | kind | layout | bounds | ...
 /// byte 56           60                64          68
-///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reach | reserved |
-/// byte 88       124        128
-///      | counts | reserved |
+///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reach | instances |
+/// byte 88       124     128
+///      | counts | level |
 /// ```
 ///
 /// Flat primitive numbers run through the meshes and then through the sphere sets: below
@@ -87,9 +88,10 @@ pub(crate) struct Header {
     pub ignored_count: u32,
     /// The largest coordinate of `bounds`, infinite where it is not representable.
     pub reach: f32,
-    reserved: u32,
+    pub instance_count: u32,
     pub counts: Counts,
-    reserved_too: u32,
+    /// Where what belongs to instances begins, in lines of 64 bytes; 0 if there are none.
+    pub level: u32,
 }
 const _: () = assert!(size_of::<Header>() == 128);
 
@@ -211,6 +213,22 @@ impl Counts {
     }
 }
 
+/// Says in the header of a block, whose own primitives are finished, that it has instances as well and ends at byte `size`;
+/// `None` if it is too large for that.
+pub(crate) fn seal_level(bytes: &mut [u8], instances: usize, size: usize) -> Option<()> {
+    let header = storage::view_mut::<Header>(bytes, 0, 1)?.first_mut()?;
+    header.level = u32::try_from(header.size / ALIGNMENT as u64).ok()?;
+    header.instance_count = instances as u32;
+    header.size = size as u64;
+    Some(())
+}
+
+/// Says in the header of a block that was packed that it ends at byte `size`.
+pub(crate) fn seal_packed(bytes: &mut [u8], size: usize) -> Option<()> {
+    storage::view_mut::<Header>(bytes, 0, 1)?.first_mut()?.size = size as u64;
+    Some(())
+}
+
 /// `count` elements at the front of `bytes`, and what follows after `size` bytes.
 fn part<T: Plain>(bytes: &mut [u8], count: u32, size: usize) -> Option<(&mut [T], &mut [u8])> {
     let (part, rest) = bytes.split_at_mut_checked(size)?;
@@ -227,6 +245,8 @@ pub(crate) struct Census {
     pub triangle_count: u32,
     pub sphere_count: u32,
     pub ignored_count: u32,
+    /// Whether what is counted as spheres are the boxes of instances.
+    pub is_index: bool,
 }
 
 impl Header {
@@ -247,9 +267,9 @@ impl Header {
             sphere_count: census.sphere_count,
             ignored_count: census.ignored_count,
             reach: census.bounds.reach(),
-            reserved: 0,
+            instance_count: 0,
             counts,
-            reserved_too: 0,
+            level: 0,
         }
     }
 }

@@ -5,6 +5,7 @@
 use super::bundle::Bundles;
 use super::cells::{GridHead, Run};
 use super::leaf::{Geometry, SphereBlock, TriangleBlock};
+use super::level::Level;
 use super::{BYTE_ORDER, BvhNode, Counts, Header, LAYOUT_COMPACT, MAGIC, VERSION};
 use crate::error::OpenError;
 use crate::storage::{self, ALIGNMENT};
@@ -37,7 +38,6 @@ impl<'m> Finished<'m> {
     ///
     /// `block` points to a header, aligned as one. If that begins as a block does, it is the header of a
     /// finished block, all of which is there, and nobody writes to it during `'m`.
-    #[cfg(feature = "capi")]
     #[inline(always)]
     pub unsafe fn known(block: *const u8) -> Option<Self> {
         // SAFETY: the caller's promise.
@@ -52,37 +52,54 @@ impl<'m> Finished<'m> {
     /// The block at the front of `bytes`; what its parts hold is not looked at.
     ///
     /// Checked are: alignment, magic, byte order, version, layout, and that the counts give just
-    /// the size that the header names, which is no more than there is.
+    /// the size that the header names, which is no more than there is; or, if there are instances, no more than that size, and
+    /// that what belongs to them is there.
     pub fn split(bytes: &'m [u8]) -> Result<Self, OpenError> {
-        if !bytes.as_ptr().cast::<Header>().is_aligned() {
-            return Err(OpenError::Misaligned);
-        }
-        let Some(header) = storage::view::<Header>(bytes, 0, 1).and_then(<[_]>::first) else {
-            let begins_right = MAGIC.starts_with(bytes.get(..8).unwrap_or(bytes));
-            return Err(if begins_right { OpenError::Truncated } else { OpenError::NotABlock });
+        let (header, end) = front(bytes)?;
+        let has_level = header.level != 0;
+        let ends = match has_level {
+            true => u64::from(header.level) * ALIGNMENT as u64 == end as u64,
+            false => header.instance_count == 0 && header.size == end as u64,
         };
-        if header.magic != MAGIC {
-            return Err(OpenError::NotABlock);
-        }
-        if header.byte_order == BYTE_ORDER.swap_bytes() {
-            return Err(OpenError::ByteOrder);
-        }
-        if header.byte_order != BYTE_ORDER {
+        let size = usize::try_from(header.size).map_err(|_| OpenError::Corrupt)?;
+        if !ends || size < end {
             return Err(OpenError::Corrupt);
         }
-        if header.version != VERSION {
-            return Err(OpenError::Version);
+        let whole = bytes.get(..size).map(Finished).ok_or(OpenError::Truncated)?;
+        if has_level {
+            Level::split(whole, end)?;
         }
-        if !matches!(header.layout, LAYOUT_COMPACT | 4 | 8 | 16) {
-            return Err(OpenError::Layout);
-        }
-        let counts = &header.counts;
-        let width = if header.layout == LAYOUT_COMPACT { u32::MAX } else { header.layout };
-        let end = counts.offsets().ok_or(OpenError::Corrupt)?.end;
-        if header.size != end as u64 || counts.bundle_lanes % width != 0 {
+        Ok(whole)
+    }
+
+    /// The same for a block without instances.
+    pub fn split_plain(bytes: &'m [u8]) -> Result<Self, OpenError> {
+        let (header, end) = front(bytes)?;
+        if header.level != 0 || header.instance_count != 0 || header.size != end as u64 {
             return Err(OpenError::Corrupt);
         }
         bytes.get(..end).map(Finished).ok_or(OpenError::Truncated)
+    }
+
+    /// Whether it has instances.
+    #[inline(always)]
+    pub fn has_level(self) -> bool {
+        self.header().level != 0
+    }
+
+    /// What belongs to its instances, if it has any.
+    pub fn level(self) -> Option<Level<'m>> {
+        match self.header().level {
+            0 => None,
+            lines => Level::of(self, lines as usize * ALIGNMENT),
+        }
+    }
+
+    /// Its header.
+    #[inline(always)]
+    pub fn header(self) -> &'m Header {
+        // SAFETY: whoever made this has found an aligned header in front.
+        unsafe { &*self.0.as_ptr().cast() }
     }
 
     /// All of it.
@@ -128,6 +145,39 @@ impl<'m> Finished<'m> {
             }
         }
     }
+}
+
+/// The header at the front of a block, if all but its size is right, and where its own primitives end.
+fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
+    if !bytes.as_ptr().cast::<Header>().is_aligned() {
+        return Err(OpenError::Misaligned);
+    }
+    let Some(header) = storage::view::<Header>(bytes, 0, 1).and_then(<[_]>::first) else {
+        let begins_right = MAGIC.starts_with(bytes.get(..8).unwrap_or(bytes));
+        return Err(if begins_right { OpenError::Truncated } else { OpenError::NotABlock });
+    };
+    if header.magic != MAGIC {
+        return Err(OpenError::NotABlock);
+    }
+    if header.byte_order == BYTE_ORDER.swap_bytes() {
+        return Err(OpenError::ByteOrder);
+    }
+    if header.byte_order != BYTE_ORDER {
+        return Err(OpenError::Corrupt);
+    }
+    if header.version != VERSION {
+        return Err(OpenError::Version);
+    }
+    if !matches!(header.layout, LAYOUT_COMPACT | 4 | 8 | 16) {
+        return Err(OpenError::Layout);
+    }
+    let counts = &header.counts;
+    let width = if header.layout == LAYOUT_COMPACT { u32::MAX } else { header.layout };
+    let end = counts.offsets().ok_or(OpenError::Corrupt)?.end;
+    if counts.bundle_lanes % width != 0 {
+        return Err(OpenError::Corrupt);
+    }
+    Ok((header, end))
 }
 
 /// The way through the parts of a finished block.

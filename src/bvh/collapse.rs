@@ -93,6 +93,8 @@ pub(super) struct Grounds<'t> {
     pub ids: &'t [u32],
     pub areas: Areas,
     pub price: f32,
+    /// Whether leaves are not to be put together: visiting an instance costs more than telling it from others.
+    pub alone: bool,
 }
 
 /// What is decided and still to be part of something: the last subtree first.
@@ -168,7 +170,7 @@ impl<const W: usize> Decided<W> {
         self.lanes = 1;
         self.content.count = count;
         if is_sphere {
-            self.content.kind = Kind::Spheres;
+            self.content.kind = if grounds.alone { Kind::Much } else { Kind::Spheres };
             return Some(());
         }
         self.content.kind = Kind::Triangles;
@@ -181,7 +183,7 @@ impl<const W: usize> Decided<W> {
         let triangles =
             ids.get(first..first + count)?.iter().filter_map(|id| match shapes.get(*id)? {
                 Shape::Triangle(triangle) => Some(triangle),
-                Shape::Sphere { .. } => None,
+                Shape::Sphere { .. } | Shape::Box(_) => None,
             });
         self.content.corners.become_those_of(triangles);
         Some(())

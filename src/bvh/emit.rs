@@ -295,7 +295,7 @@ mod tests {
     fn chosen<const W: usize>(nodes: &[BvhNode]) -> f32 {
         let mut choices = [0; LEAVES - 1];
         let scene = Scene::new(&[], &[]);
-        let grounds = Grounds { nodes, ids: &[], areas: areas(), price: PRICE };
+        let grounds = Grounds { nodes, ids: &[], areas: areas(), price: PRICE, alone: false };
         choose::<W>(&grounds, &scene, &[], &Caller::new(None, None), &mut choices).expect("a tree");
         let area = |node: u32| areas().of(&nodes[node as usize].aabb());
         let mut sum = area(0) + PRICE * (28 * W) as f32 / 256.0;

@@ -141,7 +141,7 @@ impl Part<'_> {
         // The last triangle.
         let mut last: Option<(u32, [[f32; 3]; 3])> = None;
         for_each_prim_in(scene, ids, sound, |Prim { id, shape }| {
-            let new = PrimRef::new(id, &shape.aabb(), matches!(shape, Shape::Sphere { .. }));
+            let new = PrimRef::new(id, &shape.aabb(), !shape.is_triangle());
             let (Some(strips), Shape::Triangle(corners)) = (strips, shape) else {
                 return self.push(new);
             };

@@ -14,7 +14,7 @@ const SLABS: usize = 16;
 /// Where the shapes of refs are looked up.
 #[derive(Clone, Copy)]
 pub(crate) struct Source<'s, 'a> {
-    pub scene: &'s Scene<'a>,
+    pub scene: &'s Scene<'a, 'a>,
     pub geometries: &'s [Geometry],
 }
 

@@ -25,9 +25,14 @@ use crate::storage::{self, ALIGNMENT, Plain};
 /// Primitives of a leaf of the binary tree at most: any five triangles fit into a block.
 const LEAF_MAX: usize = TRIANGLES_AT_LEAST;
 
-/// Strips of a leaf at most, of `strip` triangles each: such a strip has two vertices more than triangles.
-fn leaf_max(strip: usize) -> usize {
-    if strip == 1 { LEAF_MAX } else { TRIANGLES / (strip + 2) }
+/// Strips of a leaf at most, of `strip` triangles each: such a strip has two vertices more than triangles. In an index
+/// every instance is a leaf.
+fn leaf_max(census: &Census, strip: usize) -> usize {
+    match strip {
+        _ if census.is_index => 1,
+        1 => LEAF_MAX,
+        _ => TRIANGLES / (strip + 2),
+    }
 }
 
 /// Where the scratch lies: behind all that is finished.
@@ -56,7 +61,7 @@ impl Places {
         let room = census.hittable() as usize;
         // More leaves, a half of the primitives or all, made no ray faster: the collapse puts them
         // together again.
-        let leaves = leaf_budget(room, mixed, LEAF_MAX, false);
+        let leaves = leaf_budget(room, mixed, leaf_max(census, 1), false);
         let places = Places { refs: front(survey)?, nodes: 0, room, leaves };
         places.fitting(room, leaves, size)
     }
@@ -102,7 +107,7 @@ pub(crate) fn needs_wide(
 ) -> Result<(usize, usize), BuildError> {
     let (compact, minimum) = compact::needs(survey, census)?;
     let triangle_blocks = (u64::from(census.triangle_count) * 20).div_ceil(71) as u32;
-    let sphere_blocks = census.sphere_count.div_ceil(4);
+    let sphere_blocks = census.sphere_count.div_ceil(if census.is_index { 1 } else { 4 });
     // Three lanes for two leaf blocks.
     let lanes = 3 * u64::from(triangle_blocks + sphere_blocks) / 2;
     let bundles = 2 + lanes / u64::from(width);
@@ -172,7 +177,8 @@ where
     let whole = areas.of(&census.bounds);
     let mean = whole / prims as f32;
     for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
-        let sizes = scratch.choose::<W>(scene, survey, areas, price, how.caller, bytes)?;
+        let worth = Worth { areas, price, alone: census.is_index };
+        let sizes = scratch.choose::<W>(scene, survey, worth, how.caller, bytes)?;
         let counts = counts(survey, prims, &sizes, W as u32);
         let at = counts.offsets()?;
         if at.words <= scratch.choices && at.end <= bytes.len() {
@@ -215,7 +221,7 @@ fn grow_tree(
     let limits = Limits {
         leaves: places.leaves,
         source: cut.then_some(Source { scene, geometries }),
-        leaf_max: leaf_max(strip),
+        leaf_max: leaf_max(census, strip),
         mixed: census.is_mixed(),
         deep: true,
         effort: uneven.unwrap_or(how.effort),
@@ -244,10 +250,10 @@ fn gather_strips(
     refs: &mut [PrimRef],
 ) -> Gathered {
     let mixed = census.is_mixed();
-    let mut strip = if mixed { 1 } else { how.effort.strip };
+    let mut strip = if mixed || census.is_index { 1 } else { how.effort.strip };
     loop {
         let count = gather(scene, census, strip, how.caller, refs);
-        let leaves = leaf_budget(count, mixed, leaf_max(strip), false);
+        let leaves = leaf_budget(count, mixed, leaf_max(census, strip), false);
         // Where strips are shorter than they may be, there may be more leaves than room for them.
         if leaves <= room || strip == 1 {
             return Gathered { count, strip, leaves };
@@ -273,6 +279,14 @@ fn ids_to_end<'p>(place: &'p mut [u8], size: &Size) -> Option<(&'p mut [u8], &'p
     Some((free, storage::view_mut(ids, 0, size.prims)?))
 }
 
+/// What decides what becomes of nodes, as in [`Grounds`].
+#[derive(Clone, Copy)]
+struct Worth {
+    areas: Areas,
+    price: f32,
+    alone: bool,
+}
+
 /// The tree, its choices and the ids, at the end of the memory.
 struct Scratch {
     choices: usize,
@@ -296,8 +310,7 @@ impl Scratch {
         &self,
         scene: &Scene,
         survey: &Survey,
-        areas: Areas,
-        price: f32,
+        Worth { areas, price, alone }: Worth,
         caller: &Caller,
         bytes: &mut [u8],
     ) -> Option<Sizes> {
@@ -308,7 +321,7 @@ impl Scratch {
         let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
         let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
         let geometries = table.parts_mut(front)?.geometries;
-        let grounds = Grounds { nodes, ids, areas, price };
+        let grounds = Grounds { nodes, ids, areas, price, alone };
         choose::<W>(&grounds, scene, geometries, caller, choices)?;
         Chosen { nodes, choices, ids }.sizes::<W>()
     }

@@ -192,20 +192,20 @@ pub unsafe extern "C" fn rt_accel_pack_needs(
 ) -> RtStatus {
     guard(|| {
         // SAFETY: the caller's promise.
-        let size = unsafe { accel_at(accel) }?.block().len();
+        let Memory { size, minimum, alignment } = unsafe { accel_at(accel) }?.pack_needs()?;
         let out = pointer(out)?;
-        let memory = RtMemory { size, minimum: size, alignment: ALIGNMENT };
         // SAFETY: not null, aligned, and valid as the caller promises.
-        unsafe { out.write(memory) };
+        unsafe { out.write(RtMemory { size, minimum, alignment }) };
         Ok(())
     })
 }
 
 /// Writes the accel, with everything it refers to, as one block into `memory`, which has `size`
-/// bytes and starts at a multiple of 64. As long as there are no instances, this is a copy.
+/// bytes and starts at a multiple of 64: the accel of each instance once, however many show it. A block that refers to
+/// nothing is copied.
 ///
-/// `memory` may overlap the accel, for example to move it to a tighter place; the old one is then
-/// gone.
+/// `memory` may overlap an accel that refers to nothing, for example to move it to a tighter place; the old one is then
+/// gone. It must not overlap one that refers to others, nor these.
 ///
 /// # Safety
 ///
@@ -219,8 +219,11 @@ pub unsafe extern "C" fn rt_accel_pack(
     out: *mut *const RtAccel,
 ) -> RtStatus {
     guard(|| {
-        // SAFETY: the caller's promise.
-        let needed = unsafe { accel_at(accel) }?.block().len();
+        let (is_linked, needed) = {
+            // SAFETY: the caller's promise.
+            let accel = unsafe { accel_at(accel) }?;
+            (accel.is_linked(), accel.pack_needs()?.size)
+        };
         let memory = pointer(memory.cast::<u8>())?;
         let out = pointer(out)?;
         if memory.addr().get() % ALIGNMENT != 0 {
@@ -229,8 +232,15 @@ pub unsafe extern "C" fn rt_accel_pack(
         if size < needed {
             return Err(Error::OutOfMemory);
         }
-        // SAFETY: both are valid for `needed` bytes; they may overlap.
-        unsafe { memory.as_ptr().copy_from(accel.cast(), needed) };
+        if is_linked {
+            // SAFETY: valid for `needed` bytes, and no part of an accel, as the caller promises.
+            let memory = unsafe { core::slice::from_raw_parts_mut(memory.as_ptr().cast(), needed) };
+            // SAFETY: the caller's promise.
+            unsafe { accel_at(accel) }?.pack(memory)?;
+        } else {
+            // SAFETY: both are valid for `needed` bytes; they may overlap.
+            unsafe { memory.as_ptr().copy_from(accel.cast(), needed) };
+        }
         // SAFETY: not null, aligned, and valid as the caller promises.
         unsafe { out.write(memory.as_ptr().cast_const().cast()) };
         Ok(())
@@ -238,8 +248,11 @@ pub unsafe extern "C" fn rt_accel_pack(
 }
 
 type Needs = fn(&Scene, &BuildOptions) -> Result<Memory, BuildError>;
-type Build =
-    for<'m> fn(&Scene, &BuildOptions, &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError>;
+type Build = for<'m> fn(
+    &Scene<'_, 'm>,
+    &BuildOptions,
+    &'m mut [MaybeUninit<u8>],
+) -> Result<Accel<'m>, BuildError>;
 
 /// # Safety
 ///
@@ -257,7 +270,7 @@ unsafe fn needs(
     let progress = lender.progress();
     let options = lender.options(&progress)?;
     let out = pointer(out)?;
-    let Memory { size, minimum, alignment } = needs(&Scene::foreign(&scene), &options)?;
+    let Memory { size, minimum, alignment } = needs(&Scene::foreign(&scene, &scene), &options)?;
     // SAFETY: not null, aligned, and valid as the caller promises.
     unsafe { out.write(RtMemory { size, minimum, alignment }) };
     Ok(())
@@ -286,7 +299,7 @@ unsafe fn build(
     let size = size.min(isize::MAX as usize);
     // SAFETY: valid for `size` bytes and used by nobody else, as the caller promises.
     let memory = unsafe { core::slice::from_raw_parts_mut(memory.as_ptr(), size) };
-    let accel = build(&Scene::foreign(&scene), &options, memory)?;
+    let accel = build(&Scene::foreign(&scene, &scene), &options, memory)?;
     // SAFETY: not null, aligned, and valid as the caller promises.
     unsafe { out.write(accel.block().as_ptr().cast()) };
     Ok(())
@@ -311,7 +324,7 @@ impl RtInfo {
             upper: info.upper,
             triangle_count: info.triangle_count,
             sphere_count: info.sphere_count,
-            instance_count: 0,
+            instance_count: info.instance_count,
             ignored_count: info.ignored_count,
             resolution: info.resolution,
             size: info.size,

@@ -4,10 +4,11 @@
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 
+use super::accel_at;
 use super::status::Error;
-use super::types::{RtMesh, RtScene, RtSphereSet};
+use super::types::{RtInstance, RtMesh, RtScene, RtSphereSet};
 use super::versioned::{self, Growing};
-use crate::scene::{Geometries, Mesh, SphereSet, Strided};
+use crate::scene::{Geometries, Instance, Mesh, Placements, SphereSet, Strided};
 
 /// A scene in C's types all of whose pointers, counts and strides are right.
 ///
@@ -15,13 +16,14 @@ use crate::scene::{Geometries, Mesh, SphereSet, Strided};
 pub(crate) struct CheckedScene<'a> {
     meshes: Elements<'a, RtMesh>,
     sphere_sets: Elements<'a, RtSphereSet>,
+    instances: Elements<'a, RtInstance>,
 }
 
 impl<'a> CheckedScene<'a> {
     /// # Safety
     ///
-    /// `scene` is null or valid, as are its arrays and theirs, and nobody writes to them during
-    /// `'a`.
+    /// `scene` is null or valid, as are its arrays and theirs, the accels of its instances included, and nobody writes
+    /// to them during `'a`.
     pub unsafe fn new(scene: *const RtScene) -> Result<Self, Error> {
         // SAFETY: the caller's promise.
         let scene = unsafe { versioned::read(scene) }?;
@@ -35,13 +37,11 @@ impl<'a> CheckedScene<'a> {
         let sphere_sets = unsafe { Elements::new(scene.sphere_sets, count, size) }?;
         let (count, size) = (scene.instance_count, scene.instance_size);
         // SAFETY: the caller's promise.
-        unsafe { Elements::new(scene.instances, count, size) }?;
-        if count > 0 {
-            return Err(Error::Unsupported);
-        }
-        let checked = CheckedScene { meshes, sphere_sets };
+        let instances = unsafe { Elements::new(scene.instances, count, size) }?;
+        let checked = CheckedScene { meshes, sphere_sets, instances };
         (0..checked.mesh_count()).try_for_each(|i| checked.checked_mesh(i).map(drop))?;
         (0..checked.sphere_set_count()).try_for_each(|i| checked.checked_set(i).map(drop))?;
+        (0..checked.instance_count()).try_for_each(|i| checked.checked_instance(i).map(drop))?;
         Ok(checked)
     }
 
@@ -71,14 +71,34 @@ impl<'a> CheckedScene<'a> {
         let spheres = unsafe { words(set.spheres, 4, set.sphere_count, set.sphere_stride) }?;
         Ok(SphereSet::strided(spheres).with_mask(set.mask))
     }
+
+    fn checked_instance(&self, i: usize) -> Result<Instance<'a>, Error> {
+        let instance = self.instances.get(i).ok_or(Error::Internal)?;
+        if instance.reserved != 0 {
+            return Err(Error::InvalidArgument);
+        }
+        // SAFETY: what `new` was promised of the accels.
+        let accel = unsafe { accel_at(instance.accel) }?;
+        Ok(Instance::new(&accel, instance.object_to_world).with_mask(instance.mask))
+    }
 }
 
-impl<'a> Geometries<'a> for CheckedScene<'a> {
+impl Placements for CheckedScene<'_> {
+    fn instance_count(&self) -> usize {
+        self.instances.count
+    }
+
+    fn instance(&self, i: usize) -> Option<Instance<'_>> {
+        self.checked_instance(i).ok()
+    }
+}
+
+impl Geometries for CheckedScene<'_> {
     fn mesh_count(&self) -> usize {
         self.meshes.count
     }
 
-    fn mesh(&self, i: usize) -> Option<Mesh<'a>> {
+    fn mesh(&self, i: usize) -> Option<Mesh<'_>> {
         self.checked_mesh(i).ok()
     }
 
@@ -86,7 +106,7 @@ impl<'a> Geometries<'a> for CheckedScene<'a> {
         self.sphere_sets.count
     }
 
-    fn sphere_set(&self, i: usize) -> Option<SphereSet<'a>> {
+    fn sphere_set(&self, i: usize) -> Option<SphereSet<'_>> {
         self.checked_set(i).ok()
     }
 }

@@ -46,6 +46,12 @@ pub const RT_ERROR_NOT_FOUND: RtStatus = 15;
 pub const RT_ERROR_INTERNAL: RtStatus = 16;
 /// `progress` returned false. The memory holds no structure and may be used again.
 pub const RT_ERROR_CANCELLED: RtStatus = 17;
+/// The map of an instance is not finite, or flattens space and has no inverse.
+pub const RT_ERROR_SINGULAR: RtStatus = 19;
+/// The accel of an instance has instances itself: there are two levels.
+pub const RT_ERROR_NESTED: RtStatus = 20;
+/// The block refers to other blocks by address: `rt_accel_pack` makes one of them that can be copied and saved.
+pub const RT_ERROR_LINKED: RtStatus = 21;
 
 /// Why a call was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +73,9 @@ pub(crate) enum Error {
     NotFound,
     Internal,
     Cancelled,
+    Singular,
+    Nested,
+    Linked,
 }
 
 impl Error {
@@ -89,6 +98,9 @@ impl Error {
             Error::NotFound => RT_ERROR_NOT_FOUND,
             Error::Internal => RT_ERROR_INTERNAL,
             Error::Cancelled => RT_ERROR_CANCELLED,
+            Error::Singular => RT_ERROR_SINGULAR,
+            Error::Nested => RT_ERROR_NESTED,
+            Error::Linked => RT_ERROR_LINKED,
         }
     }
 }
@@ -103,6 +115,8 @@ impl From<BuildError> for Error {
             BuildError::Misaligned => Error::Misaligned,
             BuildError::TooLarge => Error::TooLarge,
             BuildError::NoSuchLayout { .. } => Error::InvalidArgument,
+            BuildError::SingularInstance { .. } => Error::Singular,
+            BuildError::NestedInstance { .. } => Error::Nested,
             BuildError::Cancelled => Error::Cancelled,
             BuildError::Unsupported(_) => Error::Unsupported,
         }
@@ -119,6 +133,7 @@ impl From<OpenError> for Error {
             OpenError::Truncated => Error::Truncated,
             OpenError::Layout => Error::Layout,
             OpenError::Corrupt => Error::Corrupt,
+            OpenError::Linked => Error::Linked,
         }
     }
 }
@@ -143,6 +158,9 @@ fn message(status: RtStatus) -> &'static CStr {
         RT_ERROR_NOT_FOUND => c"the ray has no such hit",
         RT_ERROR_INTERNAL => c"a fault of the library was stopped",
         RT_ERROR_CANCELLED => c"the caller cancelled the build",
+        RT_ERROR_SINGULAR => c"the map of an instance has no inverse or is not finite",
+        RT_ERROR_NESTED => c"the accel of an instance has instances itself",
+        RT_ERROR_LINKED => c"the block refers to other blocks by address and was not packed",
         _ => c"an unknown status",
     }
 }

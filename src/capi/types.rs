@@ -98,7 +98,7 @@ pub struct RtHit {
     pub prim: u32,
     /// The number of the mesh, or `mesh_count` plus the number of the sphere set.
     pub geometry: u32,
-    /// RT_NONE: there are no instances so far.
+    /// The number of the instance, RT_NONE outside instances.
     pub instance: u32,
 }
 
@@ -135,7 +135,10 @@ pub struct RtSphereSet {
     pub reserved: u32,
 }
 
-/// A built structure at another place. Unsupported so far.
+/// A built structure at another place: any map that has an inverse, mirroring, uneven scaling and shear included.
+///
+/// The built scene refers to `accel`, which must stay where it is as long as that is used, unless `rt_accel_pack` makes
+/// one block of both. `accel` has no instances itself.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct RtInstance {

@@ -95,7 +95,7 @@ pub(super) fn cells_near(space: &Space, shape: &Shape, mut f: impl FnMut(usize))
                 if range.is_straight() { None } else { Overlap::new(&corners, space.dilation) };
             (range, overlap)
         }
-        Shape::Sphere { .. } => (space.range_of(&shape.aabb()), None),
+        Shape::Sphere { .. } | Shape::Box(_) => (space.range_of(&shape.aabb()), None),
     };
     for z in range.first[2]..=range.last[2] {
         for y in range.first[1]..=range.last[1] {

@@ -22,7 +22,12 @@ pub(crate) const GRAIN: usize = 4096;
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Shape {
     Triangle([[f32; 3]; 3]),
-    Sphere { centre: [f32; 3], radius: f32 },
+    Sphere {
+        centre: [f32; 3],
+        radius: f32,
+    },
+    /// What is somewhere in a box: an instance, to those who build the index over them.
+    Box(Aabb),
 }
 
 /// A primitive that can be hit.
@@ -56,6 +61,7 @@ impl Shape {
             Shape::Sphere { centre, radius } => {
                 centre.iter().all(|x| x.is_finite()) && radius.is_finite() && radius > 0.0
             }
+            Shape::Box(aabb) => aabb.lower[0] <= aabb.upper[0],
         };
         sound.then_some(self)
     }
@@ -81,7 +87,13 @@ impl Shape {
                 let upper = (centre + radius).to_array().map(|x| f32_above(x.next_up()));
                 Aabb { lower, upper }
             }
+            Shape::Box(aabb) => aabb,
         }
+    }
+
+    /// Whether it is a triangle. What is not goes where spheres go.
+    pub fn is_triangle(&self) -> bool {
+        matches!(self, Shape::Triangle(_))
     }
 }
 
@@ -92,6 +104,11 @@ pub(crate) fn survey(scene: &Scene) -> Result<Survey, BuildError> {
         prims = prims.checked_add(n).filter(|n| *n < MOST_PRIMS).ok_or(BuildError::TooLarge)?;
         Ok(())
     };
+    if let Some(boxes) = scene.boxes() {
+        count(boxes.count())?;
+        let prim_limit = prims as u32;
+        return Ok(Survey { mesh_count: 0, geometry_count: 1, triangle_limit: 0, prim_limit });
+    }
     let geometries = scene.mesh_count().checked_add(scene.sphere_set_count());
     let geometry_count = geometries.filter(|n| *n < MOST_PRIMS).ok_or(BuildError::TooLarge)?;
     for mesh in (0..scene.mesh_count()).filter_map(|m| scene.mesh(m)) {
@@ -114,6 +131,10 @@ pub(crate) fn survey(scene: &Scene) -> Result<Survey, BuildError> {
 #[inline]
 fn for_each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut(u32, Option<Shape>)) {
     let Range { start, end } = range;
+    if let Some(boxes) = scene.boxes() {
+        return (start..end.min(boxes.count() as u32))
+            .for_each(|i| f(i, Some(Shape::Box(boxes.aabb(i as usize)))));
+    }
     let mut first = 0;
     // The part of a geometry with `count` primitives that is in the range.
     let mut next = |count: usize| {
@@ -167,13 +188,13 @@ pub(crate) const AHEAD: usize = 16;
 
 /// Finds shapes by their flat numbers, quickly if the next one is of the same mesh.
 pub(crate) struct Shapes<'s, 'a> {
-    scene: &'s Scene<'a>,
+    scene: &'s Scene<'a, 'a>,
     geometries: &'s [Geometry],
     mesh: Option<(u32, Mesh<'a>)>,
 }
 
 impl<'s, 'a> Shapes<'s, 'a> {
-    pub fn new(scene: &'s Scene<'a>, geometries: &'s [Geometry]) -> Self {
+    pub fn new(scene: &'s Scene<'a, 'a>, geometries: &'s [Geometry]) -> Self {
         Shapes { scene, geometries, mesh: None }
     }
 
@@ -207,6 +228,9 @@ impl<'s, 'a> Shapes<'s, 'a> {
 
 /// The shape with flat number `id`, whether it can be hit or not.
 fn shape(scene: &Scene, geometries: &[Geometry], id: u32) -> Option<Shape> {
+    if let Some(boxes) = scene.boxes() {
+        return Some(Shape::Box(boxes.aabb(id as usize)));
+    }
     let (number, geometry) = geometry_of(id, geometries)?;
     let prim = (id - geometry.first) as usize;
     match (number as usize).checked_sub(scene.mesh_count()) {
@@ -245,6 +269,7 @@ impl Census {
             triangle_count: 0,
             sphere_count: 0,
             ignored_count: 0,
+            is_index: scene.boxes().is_some(),
         };
         let none = census;
         let count = survey.prim_limit as usize;
@@ -267,7 +292,7 @@ impl Census {
                 self.bounds.add(&shape.aabb());
                 match shape {
                     Shape::Triangle(_) => self.triangle_count += 1,
-                    Shape::Sphere { .. } => self.sphere_count += 1,
+                    Shape::Sphere { .. } | Shape::Box(_) => self.sphere_count += 1,
                 }
             }
             Some(None) => self.ignored_count += 1,

@@ -181,6 +181,10 @@ impl Leaves<'_> {
     ) -> bool {
         query.watch().block(lanes.count_ones());
         Lanes(lanes).any(|lane| {
+            if Q::OF_INDEX {
+                let place = place(number as u32, block.first, lane as u32);
+                return query.instance(place.prim(self.prim_ids));
+            }
             let (centre, radius) = block.sphere(lane);
             sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
                 let place = place(number as u32, block.first, lane as u32);

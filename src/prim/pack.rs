@@ -6,7 +6,8 @@ use crate::block::leaf::{
     block_ref,
 };
 use crate::block::{Census, PartsMut};
-use crate::math::Aabb;
+use crate::math::rounding::f32_above;
+use crate::math::{Aabb, sum_abs, wide};
 use crate::scene::Scene;
 
 /// Packs all primitives in the order of their numbers, each once; returns the number of triangle blocks.
@@ -17,10 +18,7 @@ pub(crate) fn pack_in_order(scene: &Scene, census: &Census, parts: PartsMut) -> 
     let (triangle_ids, sphere_ids) = parts.prim_ids.split_at_mut(census.triangle_count as usize);
     let (mut triangle_ids, mut sphere_ids) = (triangle_ids.iter_mut(), sphere_ids.iter_mut());
     for_each_prim(scene, |prim| {
-        let ids = match prim.shape {
-            Shape::Triangle(_) => &mut triangle_ids,
-            Shape::Sphere { .. } => &mut sphere_ids,
-        };
+        let ids = if prim.shape.is_triangle() { &mut triangle_ids } else { &mut sphere_ids };
         if let (Some(id), Some(_)) = (ids.next(), packer.push(&prim.shape)) {
             *id = prim.id;
         }
@@ -84,6 +82,10 @@ impl<'b> Packer<'b> {
         match *shape {
             Shape::Triangle(corners) => self.push_triangle(corners),
             Shape::Sphere { centre, radius } => self.push_sphere(centre, radius),
+            Shape::Box(aabb) => {
+                let (centre, radius) = ball_around(&aabb);
+                self.push_sphere(centre, radius)
+            }
         }
     }
 
@@ -155,6 +157,14 @@ impl<'b> Packer<'b> {
         fill.next_id += 1;
         Some((block_ref(KIND_SPHERES, number as u32), lane as u32))
     }
+}
+
+/// The centre of a box, and its distance from the corners or a little more.
+fn ball_around(aabb: &Aabb) -> ([f32; 3], f32) {
+    let (lower, upper) = (wide(aabb.lower), wide(aabb.upper));
+    let centre = ((lower + upper) / 2.0).to_array().map(|x| x as f32);
+    let reach = sum_abs((upper - wide(centre)).max(wide(centre) - lower));
+    (centre, f32_above(reach))
 }
 
 /// The numbers of the open block's vertices by their bits: a hash table, since a block that was

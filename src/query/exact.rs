@@ -4,7 +4,7 @@ use core::cmp::Ordering;
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, block_ref};
-use crate::exact::{Distance, Meeting};
+use crate::exact::{Distance, Line, Meeting};
 use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
 use crate::ray::{Interval, PreparedRay, Ray};
@@ -59,6 +59,16 @@ impl ExactMet {
     #[inline(always)]
     pub fn interval(&self) -> Interval<f64> {
         interval(self.t, self.t_error)
+    }
+
+    /// The order of two meetings on different lines, this one's and the other's, in real arithmetic.
+    #[cold]
+    #[inline(never)]
+    pub fn compare(&self, line: &Line, other: &ExactMet, other_line: &Line) -> Ordering {
+        let mine = Distance::new(line, &self.meeting);
+        let others = Distance::new(other_line, &other.meeting);
+        // Both exist but for blocks of foreign bytes.
+        mine.zip(others).map_or(Ordering::Equal, |(mine, others)| mine.compare(&others))
     }
 
     /// Where what is met is stored, as a leaf of one lane.

@@ -10,7 +10,8 @@ mod options;
 mod watertight;
 
 pub(crate) use ask::{Any, Closest, Locate};
-pub(crate) use exact::Exact;
+pub(crate) use exact::{Exact, ExactMet};
+pub(crate) use options::shares_bit;
 pub(crate) use options::{Choice, Filter, flat_number, geometry_of};
 pub use options::{Facing, Precision, PrimId, QueryOptions};
 pub(crate) use watertight::Watertight;
@@ -38,6 +39,13 @@ pub struct Counts {
 
 /// Looks on while a query is answered: nobody, or [`Counts`].
 pub(crate) trait Watch {
+    /// The same, for a part of the query.
+    type Lent<'a>: Watch
+    where
+        Self: 'a;
+
+    fn lend(&mut self) -> Self::Lent<'_>;
+
     /// Whether somebody looks.
     const COUNTS: bool = false;
 
@@ -53,9 +61,22 @@ pub(crate) trait Watch {
     fn rounding(&mut self) {}
 }
 
-impl Watch for () {}
+impl Watch for () {
+    type Lent<'a> = ();
+
+    fn lend(&mut self) {}
+}
 
 impl Watch for &mut Counts {
+    type Lent<'a>
+        = &'a mut Counts
+    where
+        Self: 'a;
+
+    fn lend(&mut self) -> &mut Counts {
+        self
+    }
+
     const COUNTS: bool = true;
 
     fn step(&mut self) {
@@ -130,6 +151,14 @@ pub(crate) trait Query {
 
     /// Considers a sphere; true ends the traversal.
     fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool;
+
+    /// Whether it is asked of an index, in which lanes of sphere blocks are instances.
+    const OF_INDEX: bool = false;
+
+    /// Considers the instance of this number; true ends the traversal.
+    fn instance(&mut self, _number: u32) -> bool {
+        false
+    }
 
     fn watch(&mut self) -> &mut Self::Watch;
 }

@@ -87,10 +87,16 @@ impl Choice {
         self.mask == 0 && self.skip == NONE && self.facing == Facing::Both
     }
 
-    /// What `options` leave of a scene with these geometries.
+    /// What `options` leave of the primitives with these geometries in an instance, or outside instances ([`NONE`]).
     #[inline(always)]
-    pub fn new(options: &QueryOptions, geometries: &[Geometry], prim_limit: u32) -> Self {
-        let skip = options.skip.and_then(|id| flat_number(&id, geometries, prim_limit));
+    pub fn new(
+        options: &QueryOptions,
+        instance: u32,
+        geometries: &[Geometry],
+        prim_limit: u32,
+    ) -> Self {
+        let skip = options.skip.filter(|id| id.instance == instance);
+        let skip = skip.and_then(|id| flat_number(&id, geometries, prim_limit));
         let QueryOptions { mask, facing, .. } = *options;
         Choice { mask, facing, skip: skip.unwrap_or(NONE) }
     }
@@ -149,8 +155,13 @@ impl<'m> Filter<'m> {
 
     fn mask_sees(&self, prim: u32) -> bool {
         let mask = geometry_of(prim, self.geometries).map_or(0, |(_, g)| g.mask);
-        mask == 0 || mask & self.choice.mask != 0
+        shares_bit(mask, self.choice.mask)
     }
+}
+
+/// Whether what has the one mask is seen by the other: they share a bit, or one is zero.
+pub(crate) fn shares_bit(mask: u32, of_query: u32) -> bool {
+    mask == 0 || of_query == 0 || mask & of_query != 0
 }
 
 /// The number of the geometry that holds the flat number `prim`, and the geometry.
@@ -166,10 +177,10 @@ pub(crate) fn geometry_of(prim: u32, geometries: &[Geometry]) -> Option<(u32, &G
     Some((number as u32, geometries.get(number)?))
 }
 
-/// The flat number of a primitive outside instances, or `None` when it does not exist.
+/// The flat number of a primitive, or `None` when it does not exist; its instance is not looked at.
 pub(crate) fn flat_number(id: &PrimId, geometries: &[Geometry], prim_limit: u32) -> Option<u32> {
     let g = id.geometry as usize;
     let end = geometries.get(g.checked_add(1)?).map_or(prim_limit, |next| next.first);
     let prim = geometries.get(g)?.first.checked_add(id.prim)?;
-    (id.instance == NONE && prim < end).then_some(prim)
+    (prim < end).then_some(prim)
 }

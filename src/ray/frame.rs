@@ -278,6 +278,12 @@ pub(crate) struct LateRay<S: Simd> {
 }
 
 impl<S: Simd> LateRay<S> {
+    /// From given `t` to the frame's, a power of two.
+    #[inline(always)]
+    pub fn t_scale(&self) -> f64 {
+        f64::from(self.scales.t)
+    }
+
     #[inline(always)]
     fn rest(&self) -> PreparedRay {
         let LateRay { given, scales: Scales { t, space }, t_min, t_max, depth, .. } = *self;

@@ -89,6 +89,21 @@ impl NarrowSlab {
         inverse.mul(ahead.sub(pad)).sub(constant).store(&mut slab.far_shift);
         slab
     }
+
+    /// The same for boxes that are wider by `by`, in given coordinates, on all sides.
+    ///
+    /// Three roundings of the shift are granted, of which one sum and a product use two.
+    pub fn widened(&self, by: f32) -> Self {
+        let mut slab = NarrowSlab { ..*self };
+        for k in 0..3 {
+            let wider = self.reciprocal[k].abs() * (by * (1.0 + 8.0 * UNIT32));
+            let near = self.near_shift[k] + wider;
+            let far = self.far_shift[k] - wider;
+            slab.near_shift[k] = near + near.abs() * (4.0 * UNIT32);
+            slab.far_shift[k] = far - far.abs() * (4.0 * UNIT32);
+        }
+        slab
+    }
 }
 
 impl Slab for NarrowSlab {

@@ -3,14 +3,14 @@
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
 use raykern::{
-    Accel, Backend, BuildOptions, GridKind, GridOptions, Hit, Layout, OwnedAccel, PlainList,
-    Quality, QueryOptions, Ray, Scene,
+    Accel, Backend, BuildOptions, GridKind, GridOptions, Hit, Layout, OpenError, OwnedAccel,
+    PlainList, Quality, QueryOptions, Ray, Scene,
 };
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
 
 /// List, grids of every kind, and BVH in every layout and quality over one scene, each forced.
-pub struct All([(&'static str, OwnedAccel); 13]);
+pub struct All<'c>([(&'static str, OwnedAccel<'c>); 13]);
 
 /// Uses the backend that the environment's `RAYKERN_BACKEND` names, if it names one.
 pub fn choose_backend() {
@@ -19,22 +19,22 @@ pub fn choose_backend() {
     backend.unwrap_or_else(|| panic!("no backend {name}: {:?}", Backend::ALL)).force();
 }
 
-impl All {
-    pub fn build(scene: &Scene) -> Self {
+impl<'c> All<'c> {
+    pub fn build(scene: &Scene<'_, 'c>) -> Self {
         choose_backend();
         let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
         let never = with(PlainList::Never);
         let of_quality = |layout, quality| {
             let options = BuildOptions { layout, quality, ..never };
             let built = OwnedAccel::bvh(scene, &options).expect("a BVH");
-            Accel::open(built.accel().block()).expect("a sound block");
+            check_block(&built);
             built
         };
         let bvh = |layout| of_quality(layout, Quality::Balanced);
         let grid = |kind, density, depth| {
             let options = BuildOptions { grid: GridOptions { kind, density, depth }, ..never };
             let built = OwnedAccel::grid(scene, &options).expect("a grid");
-            Accel::open(built.accel().block()).expect("a sound block");
+            check_block(&built);
             built
         };
         All([
@@ -54,13 +54,23 @@ impl All {
         ])
     }
 
-    pub fn of(model: &Model) -> Self {
-        model.with_scene(Self::build)
-    }
-
     pub fn accels(&self) -> [(&'static str, Accel<'_>); 13] {
         self.0.each_ref().map(|(name, built)| (*name, built.accel()))
     }
+}
+
+impl All<'static> {
+    pub fn of(model: &Model) -> Self {
+        model.with_scene(Self::build)
+    }
+}
+
+/// A block can be opened, unless it refers to others.
+fn check_block(built: &OwnedAccel) {
+    let accel = built.accel();
+    let opened = Accel::open(accel.block());
+    let expected = accel.is_linked().then_some(OpenError::Linked);
+    assert_eq!(opened.err(), expected, "{:?}", accel.info());
 }
 
 /// All bits of an answer.

@@ -28,7 +28,7 @@ pub type Build<'a> = &'a (dyn Fn(&Scenery) -> Box<dyn Subject> + Sync);
 pub const STRUCTURES: [&str; 3] = ["list", "grid", "bvh"];
 
 /// List, grid and BVH, each forced.
-pub struct Structures([OwnedAccel; 3]);
+pub struct Structures([OwnedAccel<'static>; 3]);
 
 impl Structures {
     /// Builds all three.

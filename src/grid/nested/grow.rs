@@ -78,7 +78,7 @@ fn list_cell(listed: &mut List, ids: &[u32]) -> Option<u32> {
 
 /// The grid that all but large primitives are in.
 struct Outermost<'s, 'a> {
-    scene: &'s Scene<'a>,
+    scene: &'s Scene<'a, 'a>,
     census: &'s Census,
     large: &'s Large,
     options: &'s GridOptions,
@@ -161,7 +161,7 @@ impl Outermost<'_, '_> {
 
 /// Divides full cells, those of one depth before those of the next.
 struct Divider<'s, 'a, 'r, 'b> {
-    scene: &'s Scene<'a>,
+    scene: &'s Scene<'a, 'a>,
     space: Space,
     options: &'s GridOptions,
     most: u64,
@@ -173,7 +173,7 @@ struct Divider<'s, 'a, 'r, 'b> {
 
 impl<'s, 'a, 'r, 'b> Divider<'s, 'a, 'r, 'b> {
     fn new(
-        scene: &'s Scene<'a>,
+        scene: &'s Scene<'a, 'a>,
         space: Space,
         options: &'s GridOptions,
         most: u64,

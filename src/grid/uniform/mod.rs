@@ -64,12 +64,8 @@ fn pack(
     let (resolution, words) = words.split_first_mut()?;
     *resolution = resolution_word(space.resolution);
     let (triangles, spheres) = prim_ids.split_at_mut(census.triangle_count as usize);
-    sort_by_cell(scene, census, space, words, triangles, |shape| {
-        matches!(shape, Shape::Triangle(_))
-    });
-    sort_by_cell(scene, census, space, words, spheres, |shape| {
-        matches!(shape, Shape::Sphere { .. })
-    });
+    sort_by_cell(scene, census, space, words, triangles, Shape::is_triangle);
+    sort_by_cell(scene, census, space, words, spheres, |shape| !shape.is_triangle());
     let mut packer = Packer::new(triangle_blocks, sphere_blocks, 0, census.triangle_count);
     let mut shapes = Shapes::new(scene, table);
     for id in triangles.iter().chain(spheres.iter()) {

@@ -1,0 +1,104 @@
+//! The boxes of instances.
+
+use super::map::Map;
+use crate::error::BuildError;
+use crate::math::Aabb;
+use crate::math::rounding::{f32_above, f32_below};
+use crate::scene::{Boxes, Scene};
+
+/// The boxes of the index are wide enough for rays from up to so many times as far away as the instances are.
+const CALM: f64 = 16.0;
+
+/// The instances of a scene, all of which have an inverse, and what is common to their boxes.
+#[derive(Clone, Copy)]
+pub(crate) struct Placed<'s> {
+    scene: &'s Scene<'s, 's>,
+    /// Around all instances, before their boxes are widened, and everything else.
+    pub bounds: Aabb,
+    /// How far away rays may begin without further widening, and how much must be added for each unit beyond.
+    pub calm: f32,
+    pub spread: f32,
+}
+
+/// One instance of a scene.
+pub(crate) struct Placing {
+    pub map: Map,
+    pub mask: u32,
+    /// The bytes of the block that stands there.
+    pub child: *const u8,
+    contents: Aabb,
+}
+
+impl<'s> Placed<'s> {
+    /// The instances of `scene`; `bounds` is the box around all else in it.
+    pub fn new(scene: &'s Scene<'s, 's>, bounds: Aabb) -> Result<Self, BuildError> {
+        if u32::try_from(scene.instance_count()).is_err() {
+            return Err(BuildError::TooLarge);
+        }
+        let mut placed = Placed { scene, bounds, calm: 0.0, spread: 0.0 };
+        let (mut reach, mut spread) = (0.0f64, 0.0f64);
+        for i in 0..scene.instance_count() {
+            let placing = placed.check(i)?;
+            if placing.is_empty() {
+                continue;
+            }
+            let [lower, upper] = placing.map.bounds(&placing.contents);
+            placed.bounds.add(&outward([lower, upper]));
+            reach = reach.max(lower.abs().max(upper.abs()).max_element());
+            spread = spread.max(placing.map.spread());
+        }
+        // Rounded down and up. A box of no size still has room for rounding.
+        placed.calm = f32_below((reach * CALM).min(f64::from(f32::MAX)));
+        placed.spread = f32_above(spread);
+        Ok(placed)
+    }
+
+    fn check(&self, i: usize) -> Result<Placing, BuildError> {
+        let number = i as u32;
+        let instance = self.scene.instance(i).ok_or(BuildError::TooLarge)?;
+        if instance.child.has_level() {
+            return Err(BuildError::NestedInstance { instance: number });
+        }
+        let map = Map::new(instance.object_to_world);
+        let map = map.ok_or(BuildError::SingularInstance { instance: number })?;
+        let child = instance.child.bytes().as_ptr();
+        let contents = instance.child.header().bounds;
+        Ok(Placing { map, mask: instance.mask, child, contents })
+    }
+
+    /// Instance `i`.
+    pub fn get(&self, i: usize) -> Option<Placing> {
+        self.check(i).ok()
+    }
+
+    /// Its box in the index.
+    pub fn aabb_of(&self, placing: &Placing) -> Aabb {
+        if placing.is_empty() {
+            return Aabb::EMPTY;
+        }
+        let [lower, upper] = placing.map.bounds(&placing.contents);
+        let blur = placing.map.blur(&placing.contents, f64::from(self.calm));
+        outward([lower - blur, upper + blur])
+    }
+}
+
+impl Placing {
+    /// Whether nothing in it can be hit.
+    fn is_empty(&self) -> bool {
+        self.contents.lower[0] > self.contents.upper[0]
+    }
+}
+
+impl Boxes for Placed<'_> {
+    fn count(&self) -> usize {
+        self.scene.instance_count()
+    }
+
+    fn aabb(&self, i: usize) -> Aabb {
+        self.get(i).map_or(Aabb::EMPTY, |placing| self.aabb_of(&placing))
+    }
+}
+
+fn outward([lower, upper]: [glam::DVec3; 2]) -> Aabb {
+    Aabb { lower: lower.to_array().map(f32_below), upper: upper.to_array().map(f32_above) }
+}

@@ -1,0 +1,194 @@
+//! The map of an instance: its inverse, and what the rounding of rays in object space comes to in the world.
+
+use glam::DVec3;
+
+use crate::block::level::InstanceRecord;
+use crate::exact::{Line, volumes};
+use crate::math::rounding::UNIT32;
+use crate::math::{Aabb, wide};
+use crate::ray::Ray;
+
+/// `p -> A p + b`, and the inverse of `A`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Map {
+    pub object_to_world: [f32; 12],
+    /// Each number within `4 UNIT` of the real inverse's.
+    pub world_to_object: [[f64; 3]; 3],
+}
+
+/// Beyond these, what the inverse and the least floats take away is no longer far below a unit of `f32`: such an instance
+/// is visited by every ray.
+const WILD: f64 = (1u64 << 40) as f64;
+
+/// Coordinates of boxes count as no larger than this, which is beyond all that can be hit.
+const FAR: f64 = 1e39;
+
+impl Map {
+    /// The map with these three rows of four; `None` if it is not finite or has no inverse.
+    ///
+    /// The determinant is exact in sign, and within `1.001 UNIT`; the minors are differences of exact products.
+    pub fn new(object_to_world: [f32; 12]) -> Option<Map> {
+        if !object_to_world.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let [a, b, c] = rows(&object_to_world);
+        // The volume of the second pair: `a . (b x c)`.
+        let [_, determinant, _] = volumes(&Line { origin: [0.0; 3], direction: a }, [b, c, b]);
+        if determinant == 0.0 {
+            return None;
+        }
+        let [a, b, c] = [wide(a), wide(b), wide(c)];
+        let columns = [minors(b, c), minors(c, a), minors(a, b)];
+        let world_to_object =
+            [0, 1, 2].map(|i| [0, 1, 2].map(|j: usize| columns[j][i] / determinant));
+        Some(Map { object_to_world, world_to_object })
+    }
+
+    /// The box around an instance of what is in `aabb`, conservatively, before it is widened.
+    pub fn bounds(&self, aabb: &Aabb) -> [DVec3; 2] {
+        let (lower, upper) = (clamped(aabb.lower), clamped(aabb.upper));
+        let (mut least, mut most) = (self.shift(), self.shift());
+        let mut size = self.shift().abs();
+        for (k, column) in self.columns().into_iter().enumerate() {
+            let (p, q) = (column * lower[k], column * upper[k]);
+            least += p.min(q);
+            most += p.max(q);
+            size += p.abs().max(q.abs());
+        }
+        // Three products, and three sums that are rounded.
+        let rounding = size / (1u64 << 50) as f64;
+        [least - rounding, most + rounding]
+    }
+
+    /// How far a point of a ray may be, along each axis, from where the instance of what its rounded ray meets is, when the ray
+    /// comes from at most `distance` along each axis. Infinite for wild maps.
+    ///
+    /// See `docs/METHODS.md`, "Instances".
+    pub fn blur(&self, aabb: &Aabb, distance: f64) -> DVec3 {
+        if self.is_wild() {
+            return DVec3::INFINITY;
+        }
+        let origin = DVec3::splat(distance) + self.shift().abs();
+        let contents = clamped(aabb.lower).abs().max(clamped(aabb.upper).abs());
+        let met = self.widest(self.widest_inverse(origin) * 2.0 + contents);
+        let inverse = self.widest(self.widest_inverse(met));
+        let least = self.widest(DVec3::splat(f64::from(f32::from_bits(1))));
+        met * (1.125 * f64::from(UNIT32)) + inverse / (1u64 << 49) as f64 + least
+    }
+
+    /// By how much more than at any distance this grows for each unit that the ray comes from further away.
+    pub fn spread(&self) -> f64 {
+        let condition = self.condition();
+        condition * (2.25 * f64::from(UNIT32) + condition / (1u64 << 47) as f64)
+    }
+
+    fn is_wild(&self) -> bool {
+        // Written so that a NaN is wild.
+        let size = self.widest(DVec3::ONE).max_element();
+        !(size <= WILD && self.condition() <= WILD)
+    }
+
+    /// The largest row of `|A| |A^-1|`.
+    fn condition(&self) -> f64 {
+        self.widest(self.widest_inverse(DVec3::ONE)).max_element()
+    }
+
+    /// `|A| v`.
+    pub fn widest(&self, v: DVec3) -> DVec3 {
+        let [x, y, z] = self.columns().map(DVec3::abs);
+        x * v.x + y * v.y + z * v.z
+    }
+
+    /// `|A^-1| v`.
+    fn widest_inverse(&self, v: DVec3) -> DVec3 {
+        DVec3::from(self.world_to_object.map(|row| DVec3::from(row).abs().dot(v)))
+    }
+
+    fn columns(&self) -> [DVec3; 3] {
+        let m = &self.object_to_world;
+        [0, 1, 2].map(|k| wide([m[k], m[4 + k], m[8 + k]]))
+    }
+
+    /// `b`.
+    pub fn shift(&self) -> DVec3 {
+        let m = &self.object_to_world;
+        wide([m[3], m[7], m[11]])
+    }
+
+    /// `A p + b`.
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        let [x, y, z] = self.columns();
+        x * p.x + y * p.y + z * p.z + self.shift()
+    }
+
+    /// The inverse transpose times `n`.
+    pub fn normal(&self, n: DVec3) -> DVec3 {
+        let [x, y, z] = self.world_to_object.map(DVec3::from);
+        x * n.x + y * n.y + z * n.z
+    }
+}
+
+fn rows(m: &[f32; 12]) -> [[f32; 3]; 3] {
+    [0, 4, 8].map(|i| [m[i], m[i + 1], m[i + 2]])
+}
+
+/// `p x q` of floats: each product is exact, so each component is rounded once.
+fn minors(p: DVec3, q: DVec3) -> DVec3 {
+    p.cross(q)
+}
+
+fn clamped(p: [f32; 3]) -> DVec3 {
+    wide(p).clamp(DVec3::splat(-FAR), DVec3::splat(FAR))
+}
+
+impl InstanceRecord {
+    /// The map.
+    pub fn map(&self) -> Map {
+        let InstanceRecord { object_to_world, world_to_object, .. } = *self;
+        Map { object_to_world, world_to_object }
+    }
+
+    /// The ray in object space: sums in `f64`, in this order and without fusing, rounded once. `None` when a component of that
+    /// leaves the range of `f32`, or the direction becomes zero: then the instance is not hit.
+    pub fn object_ray(&self, ray: &Ray) -> Option<Ray> {
+        let m = &self.object_to_world;
+        let o = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - f64::from(m[4 * k + 3]));
+        let d = ray.direction.map(f64::from);
+        let mapped = |v: [f64; 3]| {
+            self.world_to_object.map(|[x, y, z]| ((x * v[0] + y * v[1]) + z * v[2]) as f32)
+        };
+        let (origin, direction) = (mapped(o), mapped(d));
+        let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
+        let moves = direction.iter().any(|x| *x != 0.0);
+        (finite && moves).then_some(Ray { origin, direction, ..*ray })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_maps_without_volume_are_singular() {
+        let with = |m: [f32; 9]| {
+            Map::new([m[0], m[1], m[2], 1.0, m[3], m[4], m[5], 2.0, m[6], m[7], m[8], 3.0])
+        };
+        assert!(with([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]).is_none());
+        assert!(with([1.0, 2.0, 3.0, 2.0, 4.0, 6.0, 0.0, 0.0, 1.0]).is_none());
+        assert!(with([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]).is_none());
+        assert!(with([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0f32.next_up()]).is_some());
+        assert!(with([f32::NAN, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).is_none());
+        assert!(with([1e-44, 0.0, 0.0, 0.0, 1e-44, 0.0, 0.0, 0.0, 1e-44]).is_some());
+        assert!(with([3e38, 0.0, 0.0, 0.0, 3e38, 0.0, 0.0, 0.0, 3e38]).is_some());
+    }
+
+    #[test]
+    fn a_nearly_singular_map_has_a_good_inverse() {
+        let m = [1.0, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, 0.0, 7.0, 8.0, 9.0f32.next_up(), 0.0];
+        let map = Map::new(m).expect("an inverse");
+        // The determinant is -3 times a unit of 9: the upper left minor over it, in whole numbers of that unit.
+        let unit = f64::from(9.0f32.next_up()) - 9.0;
+        let expected = (5.0 * (9.0 + unit) - 48.0) / (-3.0 * unit);
+        assert!((map.world_to_object[0][0] / expected - 1.0).abs() < 1e-15);
+    }
+}

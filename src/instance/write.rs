@@ -1,0 +1,87 @@
+//! Writes the parts of a block that belong to its instances.
+
+use super::boxes::{Placed, Placing};
+use crate::block::level::{InstanceRecord, LevelHead, LevelMut, LevelOffsets};
+use crate::block::seal_level;
+use crate::scene::Boxes;
+
+/// The bytes that head, records and children take at most.
+pub(crate) fn fixed_size(instances: usize) -> Option<usize> {
+    LevelOffsets::new(0, instances, instances).map(|at| at.index)
+}
+
+/// Writes what belongs to the instances behind the own primitives, which end at byte `own`: records and children, and the
+/// index by `build_index`, which returns its size. Returns the size of the whole block. `None` when it does not fit, or when
+/// `build_index` fails.
+pub(crate) fn write(
+    placed: &Placed,
+    own: usize,
+    bytes: &mut [u8],
+    build_index: impl FnOnce(&mut [u8]) -> Option<usize>,
+) -> Option<usize> {
+    let instances = placed.count();
+    // Until it is known how many are the same there is a child for each.
+    let widest = LevelOffsets::new(own, instances, instances)?;
+    let LevelMut { children, .. } = widest.parts_mut(bytes, instances, instances)?;
+    let child_count = list_children(placed, children);
+    let at = LevelOffsets::new(own, instances, child_count)?;
+    let LevelMut { head, instances: records, children, rest } =
+        at.parts_mut(bytes, instances, child_count)?;
+    *head = LevelHead {
+        bounds: placed.bounds,
+        child_count: child_count as u32,
+        is_linked: 1,
+        calm: placed.calm,
+        spread: placed.spread,
+        reserved: [0; 6],
+    };
+    for (i, record) in records.iter_mut().enumerate() {
+        let placing = placed.get(i)?;
+        let child = children.binary_search(&address(&placing)).ok()?;
+        *record = InstanceRecord {
+            world_to_object: placing.map.world_to_object,
+            object_to_world: placing.map.object_to_world,
+            bounds: placed.aabb_of(&placing),
+            child: child as u32,
+            mask: placing.mask,
+            reserved: [0; 2],
+        };
+    }
+    rest.fill(0);
+    let size = at.index + build_index(rest)?;
+    zero_gaps(&at, instances, child_count, bytes)?;
+    seal_level(bytes, instances, size)?;
+    Some(size)
+}
+
+/// Writes the addresses of the children, rising, each once; returns their number.
+fn list_children(placed: &Placed, children: &mut [u64]) -> usize {
+    for (i, child) in children.iter_mut().enumerate() {
+        *child = placed.get(i).map_or(0, |placing| address(&placing));
+    }
+    children.sort_unstable();
+    let mut count = 0;
+    for i in 0..children.len() {
+        if count == 0 || children[i] != children[count - 1] {
+            children[count] = children[i];
+            count += 1;
+        }
+    }
+    count
+}
+
+fn address(placing: &Placing) -> u64 {
+    placing.child.expose_provenance() as u64
+}
+
+/// The bytes between the parts are zero in every block.
+fn zero_gaps(at: &LevelOffsets, instances: usize, children: usize, bytes: &mut [u8]) -> Option<()> {
+    let ends = [
+        (at.instances + instances * size_of::<InstanceRecord>(), at.children),
+        (at.children + children * size_of::<u64>(), at.index),
+    ];
+    for (end, next) in ends {
+        bytes.get_mut(end..next)?.fill(0);
+    }
+    Some(())
+}
