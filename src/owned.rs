@@ -2,7 +2,9 @@
 
 use crate::accel::Accel;
 use crate::build::{BuildOptions, Job, Structure};
-use crate::error::BuildError;
+use crate::caller::{Caller, Threads};
+use crate::error::{BuildError, RefitError};
+use crate::refit::refit;
 use crate::scene::Scene;
 use crate::storage::AlignedMemory;
 
@@ -12,7 +14,7 @@ use crate::storage::AlignedMemory;
 pub struct Rayon;
 
 #[cfg(feature = "parallel")]
-impl crate::caller::Threads for Rayon {
+impl Threads for Rayon {
     fn worker_count(&self) -> usize {
         rayon::current_num_threads()
     }
@@ -55,8 +57,17 @@ impl OwnedAccel {
         let size = job.memory.size;
         let memory = AlignedMemory::new(size);
         let mut memory = memory.ok_or(BuildError::OutOfMemory { minimum: size })?;
-        let used = job.run(memory.bytes_mut())?.block().len();
+        let used = job.run(memory.bytes_mut())?.len();
         Ok(OwnedAccel { memory: memory.shrunk(used) })
+    }
+
+    /// Lets the structure follow `moved`, on `threads` if there are any: see [`AccelMut::refit`](crate::AccelMut::refit).
+    pub fn refit(
+        &mut self,
+        moved: &Scene,
+        threads: Option<&dyn Threads>,
+    ) -> Result<f32, RefitError> {
+        refit(self.memory.bytes_mut(), moved, &Caller::new(threads, None))
     }
 
     /// The structure. Cheap, but not free: keep the view while tracing.

@@ -38,19 +38,21 @@ const HOUSE: &[(&str, &[&str])] = &[
         "accel",
         &["batch", "block", "bvh", "error", "grid", "prim", "query", "ray", "surface", "trace"],
     ),
+    ("refit", &["block", "bvh", "caller", "error", "math", "prim", "scene", "storage"]),
     (
         "build",
         &[
-            "accel", "block", "bvh", "caller", "choice", "error", "grid", "list", "prim", "scene",
-            "storage",
+            "accel", "block", "bvh", "caller", "choice", "error", "grid", "list", "prim", "refit",
+            "scene", "storage",
         ],
     ),
-    ("owned", &["accel", "build", "caller", "error", "scene", "storage"]),
+    ("accel_mut", &["accel", "build", "caller", "error", "refit", "scene"]),
+    ("owned", &["accel", "build", "caller", "error", "refit", "scene", "storage"]),
     (
         "capi",
         &[
-            "accel", "build", "caller", "error", "grid", "query", "ray", "scene", "storage",
-            "surface",
+            "accel", "build", "caller", "error", "grid", "query", "ray", "refit", "scene",
+            "storage", "surface",
         ],
     ),
 ];

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! | header | geometries | prim_ids | grids | nodes | bundles | words |
-//! | sphere blocks | triangle blocks | runs |
+//! | sphere blocks | triangle blocks | runs | motion |
 //! ```
 //!
 //! Every part starts at a multiple of 64 bytes and is empty in blocks that have no use for it. There
@@ -13,11 +13,13 @@
 pub(crate) mod bundle;
 pub(crate) mod cells;
 pub(crate) mod leaf;
+mod motion;
 mod node;
 mod view;
 
 pub(crate) use bundle::Bundles;
 pub(crate) use leaf::Geometry;
+pub(crate) use motion::Motion;
 pub(crate) use node::BvhNode;
 pub(crate) use view::{Block, Finished};
 
@@ -31,7 +33,7 @@ use crate::storage::{self, Plain, align_up};
 const MAGIC: [u8; 8] = *b"raykern\0";
 const BYTE_ORDER: u32 = 0x0102_0304;
 /// Counted up whenever the bytes of a block change their meaning.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 pub(crate) const KIND_LIST: u32 = 1;
 pub(crate) const KIND_GRID: u32 = 2;
@@ -54,6 +56,8 @@ pub(crate) struct Counts {
     pub runs: u32,
     /// Lanes of bundles: their number times their width.
     pub bundle_lanes: u32,
+    /// 1 if the block may be refitted, else 0.
+    pub motions: u32,
 }
 
 /// The first 128 bytes.
@@ -63,8 +67,8 @@ pub(crate) struct Counts {
 ///      | magic | byte order | version | size | kind | layout | bounds | ...
 /// byte 56           60                64          68
 ///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reach | reserved |
-/// byte 88       124        128
-///      | counts | reserved |
+/// byte 88       128
+///      | counts |
 /// ```
 ///
 /// Flat primitive numbers run through the meshes and then through the sphere sets: below
@@ -89,11 +93,10 @@ pub(crate) struct Header {
     pub reach: f32,
     reserved: u32,
     pub counts: Counts,
-    reserved_too: u32,
 }
 const _: () = assert!(size_of::<Header>() == 128);
 
-// SAFETY: numbers only; 8 + 4 + 4 + 8 + 4 + 4 + 24 + 24 + 8 + 36 + 4 = 128, so no padding.
+// SAFETY: numbers only; 8 + 4 + 4 + 8 + 4 + 4 + 24 + 24 + 8 + 40 = 128, so no padding.
 #[allow(unsafe_code, reason = "a promise about the layout drawn above")]
 unsafe impl Plain for Header {}
 
@@ -109,6 +112,7 @@ pub(crate) struct Offsets {
     pub sphere_blocks: usize,
     pub triangle_blocks: usize,
     pub runs: usize,
+    pub motions: usize,
     pub end: usize,
 }
 
@@ -133,6 +137,7 @@ impl Counts {
             sphere_blocks: part(self.sphere_blocks, size_of::<SphereBlock>())?,
             triangle_blocks: part(self.triangle_blocks, size_of::<TriangleBlock>())?,
             runs: part(self.runs, size_of::<Run>())?,
+            motions: part(self.motions, size_of::<Motion>())?,
             end: 0,
         };
         Some(Offsets { end: usize::try_from(end).ok()?, ..offsets })
@@ -151,6 +156,7 @@ pub(crate) struct PartsMut<'b> {
     pub sphere_blocks: &'b mut [SphereBlock],
     pub triangle_blocks: &'b mut [TriangleBlock],
     pub runs: &'b mut [Run],
+    pub motions: &'b mut [Motion],
     /// What lies behind the last part.
     pub rest: &'b mut [u8],
 }
@@ -170,7 +176,8 @@ impl Counts {
         let (sphere_blocks, rest) = part(rest, self.sphere_blocks, spheres)?;
         let triangles = at.runs - at.triangle_blocks;
         let (triangle_blocks, rest) = part(rest, self.triangle_blocks, triangles)?;
-        let (runs, rest) = part(rest, self.runs, at.end - at.runs)?;
+        let (runs, rest) = part(rest, self.runs, at.motions - at.runs)?;
+        let (motions, rest) = part(rest, self.motions, at.end - at.motions)?;
         Some(PartsMut {
             geometries,
             prim_ids,
@@ -181,6 +188,7 @@ impl Counts {
             sphere_blocks,
             triangle_blocks,
             runs,
+            motions,
             rest,
         })
     }
@@ -199,6 +207,7 @@ impl Counts {
             (at.sphere_blocks, self.sphere_blocks as usize * size_of::<SphereBlock>()),
             (at.triangle_blocks, self.triangle_blocks as usize * size_of::<TriangleBlock>()),
             (at.runs, self.runs as usize * size_of::<Run>()),
+            (at.motions, self.motions as usize * size_of::<Motion>()),
         ];
         for (start, size) in parts {
             let end = start + size;
@@ -227,6 +236,9 @@ pub(crate) struct Census {
     pub triangle_count: u32,
     pub sphere_count: u32,
     pub ignored_count: u32,
+    /// Whether the block shall be refitted: then everything counts as if it could be hit, as it may some day, and
+    /// vertices are the same if their numbers are.
+    pub refit: bool,
 }
 
 impl Header {
@@ -249,8 +261,17 @@ impl Header {
             reach: census.bounds.reach(),
             reserved: 0,
             counts,
-            reserved_too: 0,
         }
+    }
+
+    /// What has moved can be hit, or not, at other places.
+    pub fn renew(&mut self, bounds: Aabb, triangle_count: u32, sphere_count: u32) {
+        self.bounds = bounds;
+        self.reach = bounds.reach();
+        self.triangle_count = triangle_count;
+        self.sphere_count = sphere_count;
+        self.ignored_count =
+            self.prim_limit.saturating_sub(triangle_count.saturating_add(sphere_count));
     }
 }
 
@@ -279,6 +300,7 @@ mod tests {
             triangle_blocks: most,
             runs: most,
             bundle_lanes: most,
+            motions: most,
         };
         // Two terabytes: addressable with 64 bits, refused with 32.
         assert_eq!(counts.offsets().is_some(), usize::BITS == 64);

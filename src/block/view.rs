@@ -5,7 +5,7 @@
 use super::bundle::Bundles;
 use super::cells::{GridHead, Run};
 use super::leaf::{Geometry, SphereBlock, TriangleBlock};
-use super::{BYTE_ORDER, BvhNode, Counts, Header, LAYOUT_COMPACT, MAGIC, VERSION};
+use super::{BYTE_ORDER, BvhNode, Counts, Header, LAYOUT_COMPACT, MAGIC, Motion, VERSION};
 use crate::error::OpenError;
 use crate::storage::{self, ALIGNMENT};
 
@@ -79,10 +79,17 @@ impl<'m> Finished<'m> {
         let counts = &header.counts;
         let width = if header.layout == LAYOUT_COMPACT { u32::MAX } else { header.layout };
         let end = counts.offsets().ok_or(OpenError::Corrupt)?.end;
-        if header.size != end as u64 || counts.bundle_lanes % width != 0 {
+        if header.size != end as u64 || counts.bundle_lanes % width != 0 || counts.motions > 1 {
             return Err(OpenError::Corrupt);
         }
         bytes.get(..end).map(Finished).ok_or(OpenError::Truncated)
+    }
+
+    /// What it keeps for refitting, if it may be.
+    pub fn motion(self) -> Option<&'m Motion> {
+        let counts = &self.parts().header.counts;
+        let at = counts.offsets()?.motions;
+        storage::view(self.0, at, counts.motions as usize)?.first()
     }
 
     /// All of it.

@@ -2,7 +2,7 @@
 
 use core::ffi::{CStr, c_char};
 
-use crate::error::{BuildError, OpenError};
+use crate::error::{BuildError, OpenError, RefitError};
 
 /// Success is zero, everything else says why a call was refused. A number keeps its meaning for
 /// ever; `rt_status_message` puts it in words.
@@ -47,6 +47,11 @@ pub const RT_ERROR_INTERNAL: RtStatus = 16;
 /// `progress` returned false. The memory holds no structure and may be used again.
 pub const RT_ERROR_CANCELLED: RtStatus = 17;
 
+/// The block was not built with `RtBuildOptions.refit`, or it is a grid, which is built anew instead.
+pub const RT_ERROR_NOT_REFITTABLE: RtStatus = 18;
+/// Meshes, sphere sets, counts or vertex numbers are not those of the build.
+pub const RT_ERROR_OTHER_SCENE: RtStatus = 19;
+
 /// Why a call was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Error {
@@ -67,6 +72,8 @@ pub(crate) enum Error {
     NotFound,
     Internal,
     Cancelled,
+    NotRefittable,
+    OtherScene,
 }
 
 impl Error {
@@ -89,6 +96,8 @@ impl Error {
             Error::NotFound => RT_ERROR_NOT_FOUND,
             Error::Internal => RT_ERROR_INTERNAL,
             Error::Cancelled => RT_ERROR_CANCELLED,
+            Error::NotRefittable => RT_ERROR_NOT_REFITTABLE,
+            Error::OtherScene => RT_ERROR_OTHER_SCENE,
         }
     }
 }
@@ -104,7 +113,16 @@ impl From<BuildError> for Error {
             BuildError::TooLarge => Error::TooLarge,
             BuildError::NoSuchLayout { .. } => Error::InvalidArgument,
             BuildError::Cancelled => Error::Cancelled,
-            BuildError::Unsupported(_) => Error::Unsupported,
+        }
+    }
+}
+
+impl From<RefitError> for Error {
+    fn from(error: RefitError) -> Error {
+        match error {
+            RefitError::NotRefittable => Error::NotRefittable,
+            RefitError::OtherScene => Error::OtherScene,
+            RefitError::NoBlock(error) => error.into(),
         }
     }
 }
@@ -143,6 +161,8 @@ fn message(status: RtStatus) -> &'static CStr {
         RT_ERROR_NOT_FOUND => c"the ray has no such hit",
         RT_ERROR_INTERNAL => c"a fault of the library was stopped",
         RT_ERROR_CANCELLED => c"the caller cancelled the build",
+        RT_ERROR_NOT_REFITTABLE => c"the block was not built to be refitted",
+        RT_ERROR_OTHER_SCENE => c"meshes, counts or vertex numbers are not those of the build",
         _ => c"an unknown status",
     }
 }
