@@ -82,7 +82,6 @@ static void check_builds(void) {
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_kind = 3);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_density = -1.0f);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.rays_per_prim = -1.0f);
-    REFUSED(RT_ERROR_UNSUPPORTED, options.refit = 1);
 
     // A newer caller: accepted while what we do not know is zero, alone and in arrays.
     struct { RtScene scene; uint64_t more; } newer = {scene, 0};

@@ -182,7 +182,8 @@ typedef struct RtBuildOptions {
     uint32_t quality;
     // One of `RT_LAYOUT_`, for a BVH.
     uint32_t layout;
-    // 1: the block can be refitted when vertices move. Unsupported so far.
+    // 1: the block can be refitted when vertices move, unless it is a grid: see `rt_accel_refit`. `rt_build` then makes no
+    // grid.
     uint32_t refit;
     // One of `RT_PLAIN_LIST_`.
     uint32_t plain_list;
@@ -242,6 +243,11 @@ typedef struct RtInfo {
     size_t leaf_size;
     // Bytes of primitive numbers.
     size_t id_size;
+    // 1 if the block can be refitted.
+    uint32_t refit;
+    // What a ray costs by the surface area heuristic, over that when the block was built: from about 2 on a new build is
+    // likely to pay. 0 if the block cannot be refitted.
+    float cost_growth;
 } RtInfo;
 
 // The points `origin + t * direction` with `t_min <= t <= t_max`, both ends included.
@@ -344,6 +350,10 @@ typedef struct RtSurface {
 #define RT_ERROR_INTERNAL 16
 // `progress` returned false. The memory holds no structure and may be used again.
 #define RT_ERROR_CANCELLED 17
+// The block was not built with `RtBuildOptions.refit`, or it is a grid, which is built anew instead.
+#define RT_ERROR_NOT_REFITTABLE 18
+// Meshes, sphere sets, counts or vertex numbers are not those of the build.
+#define RT_ERROR_OTHER_SCENE 19
 
 #ifdef __cplusplus
 extern "C" {
@@ -424,6 +434,24 @@ RtStatus rt_accel_pack(const RtAccel *accel,
                        void *memory,
                        size_t size,
                        const RtAccel **out);
+
+// Lets the block at the front of `memory` follow `moved`: the scene that was built, with other vertices, spheres or masks.
+// The block was built with `RtBuildOptions.refit`, or opened, in these `size` bytes or copied to them; its accel stays valid.
+//
+// Meshes, sphere sets, counts and vertex numbers must be the same. Where things are does not matter: what ceases to be
+// finite or to have an area is ignored, and what was ignored may become visible. Answers are those of a structure that is
+// built anew; `RtInfo.cost_growth` says when building anew is likely to pay. Needs no memory beyond the block, which is
+// untouched unless the status is RT_OK. Nobody traces rays through the block during the call.
+RtStatus rt_accel_refit(void *memory,
+                        size_t size,
+                        const RtScene *moved);
+
+// The same on the threads that `options` lend; all else in them is ignored. `options` may be null. The bytes do not depend
+// on the number of threads.
+RtStatus rt_accel_refit_with(void *memory,
+                             size_t size,
+                             const RtScene *moved,
+                             const RtBuildOptions *options);
 
 // The closest hit: the least `t`, and at equal `t` the first by geometry and primitive.
 //

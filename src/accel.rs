@@ -3,7 +3,7 @@
 use crate::batch;
 use crate::block::cells::resolution;
 use crate::block::level::Level;
-use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST};
+use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST, Motion};
 use crate::bvh;
 use crate::error::OpenError;
 use crate::grid;
@@ -82,6 +82,9 @@ pub struct Info {
     pub leaf_size: usize,
     /// Bytes of primitive ids.
     pub id_size: usize,
+    /// What a ray costs by the surface area heuristic, over that when the block was built; `None` if the block cannot be
+    /// refitted. From about 2 on a new build is likely to pay.
+    pub cost_growth: Option<f32>,
 }
 
 /// A built structure: a view of one block in the caller's memory.
@@ -346,10 +349,11 @@ fn block_is_sound(block: &Block) -> bool {
     let leaves = Leaves::of(block);
     let no_grid = grids.is_empty() && words.is_empty() && runs.is_empty();
     let no_nodes = nodes.is_empty();
+    let no_motion = header.counts.motions == 0;
     let structure = match (header.kind, bundles) {
         (KIND_LIST, Bundles::None) => no_grid && no_nodes,
         (KIND_GRID, Bundles::None) => {
-            no_nodes && grid::grids_are_sound(grids, words, runs, &leaves)
+            no_nodes && no_motion && grid::grids_are_sound(grids, words, runs, &leaves)
         }
         (KIND_BVH, Bundles::None) => no_grid && bvh::tree_is_sound(nodes, &leaves),
         (KIND_BVH, Bundles::Four(bundles)) => {
@@ -415,6 +419,7 @@ fn info_of(block: &Block) -> Info {
             + size_of_val(runs),
         leaf_size: size_of_val(block.triangle_blocks) + size_of_val(block.sphere_blocks),
         id_size: size_of_val(block.prim_ids),
+        cost_growth: whole.motion().map(Motion::growth),
     }
 }
 

@@ -8,12 +8,13 @@ use crate::block::Census;
 use crate::bvh::{self, Effort, How};
 use crate::caller::{Caller, Threads};
 use crate::choice::suits_grid;
-use crate::error::{BuildError, Unsupported};
+use crate::error::BuildError;
 use crate::grid::{self, GridKind, GridOptions};
 use crate::instance::{Placed, fixed_size, write};
 use crate::list;
 use crate::math::Aabb;
 use crate::prim::{Survey, survey};
+use crate::refit;
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT};
 
@@ -61,7 +62,8 @@ pub struct BuildOptions<'a> {
     pub quality: Quality,
     /// The layout of a BVH.
     pub layout: Layout,
-    /// Whether the block must stay refittable. Not in this version.
+    /// Whether the block can be refitted when vertices move; for lists and BVHs. Vertices are then the same if their numbers
+    /// are, nothing is cut in two, and what cannot be hit has a place, as it may be hit later. [`build()`] then makes no grid.
     pub refit: bool,
     /// Whether a plain list may stand in.
     pub plain_list: PlainList,
@@ -113,7 +115,7 @@ pub fn build_bvh<'m>(
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, options.bvh())?.run_in(memory)
+    finished(bvh_bytes(scene, options, memory)?)
 }
 
 /// Builds a grid over `scene` at the front of `memory`.
@@ -129,7 +131,7 @@ pub fn build_grid<'m>(
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, Structure::Grid(options.grid))?.run_in(memory)
+    finished(Job::new(scene, options, Structure::Grid(options.grid))?.run_in(memory)?)
 }
 
 /// The memory [`build`] needs for `scene`.
@@ -144,7 +146,21 @@ pub fn build<'m>(
     options: &BuildOptions,
     memory: &'m mut [MaybeUninit<u8>],
 ) -> Result<Accel<'m>, BuildError> {
-    Job::new(scene, options, Structure::Automatic)?.run_in(memory)
+    finished(Job::new(scene, options, Structure::Automatic)?.run_in(memory)?)
+}
+
+/// [`build_bvh`], for those who will write to the block.
+pub(crate) fn bvh_bytes<'m>(
+    scene: &Scene,
+    options: &BuildOptions,
+    memory: &'m mut [MaybeUninit<u8>],
+) -> Result<&'m mut [u8], BuildError> {
+    Job::new(scene, options, options.bvh())?.run_in(memory)
+}
+
+/// The accel of the block that a build returned. That is always recognised, so the error does not arise.
+fn finished(block: &[u8]) -> Result<Accel<'_>, BuildError> {
+    Accel::recognise(block).map_err(|_| BuildError::TooLarge)
 }
 
 /// What a build makes of a scene.
@@ -195,14 +211,20 @@ impl Plan {
     ) -> Result<Self, BuildError> {
         let survey = survey(scene)?;
         let census = Census::take(scene, &survey, &Caller::new(options.threads, None))?;
+        // Instances are not refitted: their index is built anew.
+        let refit = options.refit && scene.instance_count() == 0 && scene.boxes().is_none();
+        let kept = if refit { census.for_refit() } else { census };
         let structure = match asked {
-            _ if census.hittable() <= handful => Structure::List,
+            _ if kept.hittable() <= handful => Structure::List,
+            Structure::Grid(_) if census.hittable() == 0 => Structure::List,
+            Structure::Automatic if refit => options.bvh(),
             Structure::Automatic if suits_grid(scene, &census, options.rays_per_prim) => {
                 Structure::Grid(GridOptions { kind: GridKind::Uniform, ..options.grid })
             }
             Structure::Automatic => options.bvh(),
             asked => asked,
         };
+        let census = if matches!(structure, Structure::Grid(_)) { census } else { kept };
         let (size, minimum) = match structure {
             Structure::List => list::needs(&survey, &census)?,
             Structure::Grid(grid) => grid::needs(scene, &survey, &census, &grid)?,
@@ -284,8 +306,8 @@ impl<'s> Job<'s> {
         Ok(Job { scene, options, own, level, memory })
     }
 
-    /// Builds into memory that may hold anything.
-    fn run_in<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError> {
+    /// Builds into memory that may hold anything; returns the block.
+    fn run_in<'m>(&self, memory: &'m mut [MaybeUninit<u8>]) -> Result<&'m mut [u8], BuildError> {
         let Memory { size, minimum, alignment } = self.memory;
         if !memory.as_ptr().addr().is_multiple_of(alignment) {
             return Err(BuildError::Misaligned);
@@ -297,8 +319,8 @@ impl<'s> Job<'s> {
         self.run(storage::zeroed(&mut memory[..usable]))
     }
 
-    /// Builds into zero bytes, aligned and at least the minimum.
-    pub fn run<'m>(&self, bytes: &'m mut [u8]) -> Result<Accel<'m>, BuildError> {
+    /// Builds into zero bytes, aligned and at least the minimum; returns the block.
+    pub fn run<'m>(&self, bytes: &'m mut [u8]) -> Result<&'m mut [u8], BuildError> {
         let minimum = self.memory.minimum;
         let Job { scene, options, own, level, .. } = self;
         let caller = Caller::new(options.threads, options.progress);
@@ -309,13 +331,17 @@ impl<'s> Job<'s> {
         let room = room / ALIGNMENT * ALIGNMENT;
         let built = own.run(scene, options, &caller, &mut bytes[..room]);
         caller.done(1.0).ok_or(BuildError::Cancelled)?;
-        if let Some(level) = level {
-            level.run(options, built?, bytes).ok_or(BuildError::OutOfMemory { minimum })?;
-        } else {
-            built?;
+        let size = match level {
+            Some(level) => level.run(options, built?, bytes),
+            None => Some(built?),
+        };
+        let block = size.and_then(|size| bytes.get_mut(..size));
+        let block = block.ok_or(BuildError::OutOfMemory { minimum })?;
+        if own.census.refit {
+            // The scene was checked and the block is whole, so this error does not arise.
+            refit::finish(block, scene, &caller).ok_or(BuildError::TooLarge)?;
         }
-        // A block that was just sealed is always recognised, so this error does not arise.
-        Accel::recognise(bytes).map_err(|_| BuildError::OutOfMemory { minimum })
+        Ok(block)
     }
 }
 
@@ -336,9 +362,6 @@ impl BuildOptions<'_> {
         match self.layout {
             Layout::Automatic | Layout::Compact | Layout::Wide(4 | 8 | 16) => {}
             Layout::Wide(width) => return Err(BuildError::NoSuchLayout { width }),
-        }
-        if self.refit {
-            return Err(BuildError::Unsupported(Unsupported::Refit));
         }
         Ok(())
     }

@@ -45,16 +45,19 @@ pub enum BuildError {
     },
     /// The caller's progress callback said to stop. The memory holds no structure and may be used again.
     Cancelled,
-    /// The option is part of the interface but not of this version.
-    Unsupported(Unsupported),
 }
 
-/// What this version cannot do yet.
+/// Why a block was not refitted. Nothing was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Unsupported {
-    /// Refitting.
-    Refit,
+pub enum RefitError {
+    /// The block was not built with [`BuildOptions::refit`](crate::BuildOptions::refit), or it is a grid, which is built anew instead.
+    NotRefittable,
+    /// The scene has other meshes, sphere sets, counts or vertex numbers than the one that was built, or a vertex number
+    /// out of range.
+    OtherScene,
+    /// There is no block.
+    NoBlock(OpenError),
 }
 
 /// Why a block was not opened.
@@ -103,16 +106,19 @@ impl fmt::Display for BuildError {
                 write!(f, "the accel of instance {instance} has instances itself")
             }
             BuildError::Cancelled => f.write_str("the caller cancelled the build"),
-            BuildError::Unsupported(what) => write!(f, "this version cannot build it: {what}"),
         }
     }
 }
 
-impl fmt::Display for Unsupported {
+impl fmt::Display for RefitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Unsupported::Refit => "blocks cannot be refitted yet",
-        })
+        match self {
+            RefitError::NotRefittable => f.write_str("the block was not built to be refitted"),
+            RefitError::OtherScene => {
+                f.write_str("meshes, counts or vertex numbers are not those of the build")
+            }
+            RefitError::NoBlock(error) => write!(f, "there is no block: {error}"),
+        }
     }
 }
 
@@ -132,4 +138,5 @@ impl fmt::Display for OpenError {
 }
 
 impl core::error::Error for BuildError {}
+impl core::error::Error for RefitError {}
 impl core::error::Error for OpenError {}

@@ -19,6 +19,8 @@
 //!   A handful of primitives becomes a plain list.
 //! - [`Accel`] is a view of such a block: [`Accel::intersect`], [`Accel::occluded`] and their
 //!   relatives. All of them take `&self`, allocate nothing and may run on many threads at once.
+//! - [`AccelMut`] and [`OwnedAccel`] follow what moves: a block that was built with [`BuildOptions::refit`] is refitted in
+//!   its place.
 //! - A block holds no pointers: it may be copied, saved, mapped, and [opened](Accel::open) again.
 //!
 //! List, grid and BVH give the same answers, to the bit, for a scene and a ray: see
@@ -52,6 +54,7 @@ compile_error!("raykern needs square roots: enable the feature `std` or the feat
 struct Readme;
 
 mod accel;
+mod accel_mut;
 mod batch;
 mod block;
 mod build;
@@ -75,6 +78,7 @@ mod pack;
 mod prim;
 mod query;
 mod ray;
+mod refit;
 mod scene;
 mod sieve;
 mod simd;
@@ -83,12 +87,13 @@ mod surface;
 mod trace;
 
 pub use accel::{Accel, Info, Kind, Layout};
+pub use accel_mut::AccelMut;
 pub use build::{
     BuildOptions, Memory, PlainList, Quality, build, build_bvh, build_grid, bvh_needs, grid_needs,
     needs,
 };
 pub use caller::Threads;
-pub use error::{BuildError, OpenError, Unsupported};
+pub use error::{BuildError, OpenError, RefitError};
 pub use grid::{GridKind, GridOptions};
 #[cfg(feature = "alloc")]
 pub use owned::OwnedAccel;

@@ -9,19 +9,21 @@ use crate::scene::Scene;
 /// Up to this many primitives no structure is faster than testing them all.
 pub(crate) const HANDFUL: u32 = 16;
 
-fn counts(geometries: u32, triangles: u32, spheres: u32) -> Counts {
+fn counts(survey: &Survey, census: &Census) -> Counts {
+    let (triangles, spheres) = (census.triangle_count, census.sphere_count);
     Counts {
-        geometries,
+        geometries: survey.geometry_count,
         prim_ids: triangles + spheres,
         sphere_blocks: spheres.div_ceil(SPHERES as u32),
         triangle_blocks: triangles.div_ceil(TRIANGLES_AT_LEAST as u32),
+        motions: census.refit.into(),
         ..Counts::default()
     }
 }
 
 /// The bytes that [`build`] can use, and the least that it needs: the same.
 pub(crate) fn needs(survey: &Survey, census: &Census) -> Result<(usize, usize), BuildError> {
-    let counts = counts(survey.geometry_count, census.triangle_count, census.sphere_count);
+    let counts = counts(survey, census);
     counts.offsets().map(|at| (at.end, at.end)).ok_or(BuildError::TooLarge)
 }
 
@@ -32,7 +34,7 @@ pub(crate) fn build(
     census: &Census,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
-    let mut counts = counts(survey.geometry_count, census.triangle_count, census.sphere_count);
+    let mut counts = counts(survey, census);
     let minimum = counts.offsets().map_or(usize::MAX, |at| at.end);
     let short = BuildError::OutOfMemory { minimum };
     let parts = counts.parts_mut(bytes).ok_or(short)?;

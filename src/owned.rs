@@ -4,7 +4,9 @@ use core::marker::PhantomData;
 
 use crate::accel::Accel;
 use crate::build::{BuildOptions, Job, Structure};
-use crate::error::BuildError;
+use crate::caller::{Caller, Threads};
+use crate::error::{BuildError, RefitError};
+use crate::refit::refit;
 use crate::scene::Scene;
 use crate::storage::AlignedMemory;
 
@@ -14,7 +16,7 @@ use crate::storage::AlignedMemory;
 pub struct Rayon;
 
 #[cfg(feature = "parallel")]
-impl crate::caller::Threads for Rayon {
+impl Threads for Rayon {
     fn worker_count(&self) -> usize {
         rayon::current_num_threads()
     }
@@ -68,8 +70,17 @@ impl OwnedAccel<'_> {
         let size = job.memory.size;
         let memory = AlignedMemory::new(size);
         let mut memory = memory.ok_or(BuildError::OutOfMemory { minimum: size })?;
-        let used = job.run(memory.bytes_mut())?.block().len();
+        let used = job.run(memory.bytes_mut())?.len();
         Ok(OwnedAccel { memory: memory.shrunk(used), children: PhantomData })
+    }
+
+    /// Lets the structure follow `moved`, on `threads` if there are any: see [`AccelMut::refit`](crate::AccelMut::refit).
+    pub fn refit(
+        &mut self,
+        moved: &Scene,
+        threads: Option<&dyn Threads>,
+    ) -> Result<f32, RefitError> {
+        refit(self.memory.bytes_mut(), moved, &Caller::new(threads, None))
     }
 
     /// The structure. Cheap, but not free: keep the view while tracing.

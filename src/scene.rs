@@ -118,11 +118,17 @@ impl<'a> Mesh<'a> {
     #[inline]
     pub fn triangle(&self, i: usize) -> Option<[[f32; 3]; 3]> {
         let corner = |v: usize| self.vertices.get::<3>(v);
-        let [a, b, c] = match &self.indices {
-            Some(indices) => indices.get::<3>(i)?.map(|v| v as usize),
-            None => [3 * i, 3 * i + 1, 3 * i + 2],
-        };
+        let [a, b, c] = self.numbers(i)?;
         Some([corner(a)?, corner(b)?, corner(c)?])
+    }
+
+    /// The numbers of the vertices of triangle `i`, which need not exist.
+    #[inline]
+    pub(crate) fn numbers(&self, i: usize) -> Option<[usize; 3]> {
+        match &self.indices {
+            Some(indices) => Some(indices.get::<3>(i)?.map(|v| v as usize)),
+            None => Some([3 * i, 3 * i + 1, 3 * i + 2]),
+        }
     }
 }
 

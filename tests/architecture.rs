@@ -43,20 +43,22 @@ const HOUSE: &[(&str, &[&str])] = &[
             "scene", "storage", "surface", "trace",
         ],
     ),
+    ("refit", &["block", "bvh", "caller", "error", "math", "prim", "scene", "storage"]),
     (
         "build",
         &[
             "accel", "block", "bvh", "caller", "choice", "error", "grid", "instance", "list",
-            "math", "prim", "scene", "storage",
+            "math", "prim", "refit", "scene", "storage",
         ],
     ),
     ("pack", &["accel", "block", "build", "error", "storage"]),
-    ("owned", &["accel", "build", "caller", "error", "scene", "storage"]),
+    ("accel_mut", &["accel", "build", "caller", "error", "refit", "scene"]),
+    ("owned", &["accel", "build", "caller", "error", "refit", "scene", "storage"]),
     (
         "capi",
         &[
-            "accel", "build", "caller", "error", "grid", "query", "ray", "scene", "storage",
-            "surface",
+            "accel", "build", "caller", "error", "grid", "query", "ray", "refit", "scene",
+            "storage", "surface",
         ],
     ),
 ];

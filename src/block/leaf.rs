@@ -15,14 +15,15 @@ pub(crate) const SPHERES: usize = 15;
 /// Up to 16 triangles over up to 16 shared vertices.
 ///
 /// ```text
-/// byte 0        64       128      192       216     220     224   248        256
-///      | x[16] | y[16] | z[16] | corners | first | count | aabb | reserved |
+/// byte 0        64       128      192       216     220     224   248    252        256
+///      | x[16] | y[16] | z[16] | corners | first | count | aabb | live | reserved |
 /// ```
 ///
 /// `corners[k]` holds the number of vertex `k` of each triangle in a nibble, the lower one of a byte
 /// first: those of even triangles in the first four bytes, those of odd ones in the others. So eight
 /// bytes repeated, each half shifted by a nibble for every second lane, are the numbers of all 16.
-/// Triangle `i < count` is primitive `prim_ids[first + i]`. `aabb` holds them all.
+/// Triangle `i < count` is primitive `prim_ids[first + i]`. It can be hit if bit `i` of `live` is set: all of them, but
+/// in blocks that may be refitted. `aabb` holds those.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct TriangleBlock {
@@ -32,7 +33,8 @@ pub(crate) struct TriangleBlock {
     pub first: u32,
     pub count: u32,
     pub aabb: Aabb,
-    pub reserved: [u32; 2],
+    pub live: u32,
+    pub reserved: u32,
 }
 const _: () = assert!(size_of::<TriangleBlock>() == 256);
 
@@ -46,7 +48,8 @@ impl TriangleBlock {
         first: 0,
         count: 0,
         aabb: Aabb::EMPTY,
-        reserved: [0; 2],
+        live: 0,
+        reserved: 0,
     };
 
     /// The vertices of triangle `i < 16`, whatever the block holds.
@@ -76,9 +79,14 @@ impl TriangleBlock {
         largest.into_iter().fold(0, u8::max) as usize + 1
     }
 
-    /// The lanes in use, one bit each.
+    /// The lanes that can be hit, one bit each.
     #[inline(always)]
     pub fn lanes(&self) -> u32 {
+        self.live
+    }
+
+    /// The lanes that have a triangle, whether it can be hit or not.
+    pub fn held(&self) -> u32 {
         low_bits(self.count.min(TRIANGLES as u32))
     }
 
@@ -100,11 +108,11 @@ fn nibble(i: usize) -> (usize, usize) {
 /// Up to 15 spheres.
 ///
 /// ```text
-/// byte 0        60       120      180           240     244     248        256
-///      | x[15] | y[15] | z[15] | radius[15] | first | count | reserved |
+/// byte 0        60       120      180           240     244     248    252        256
+///      | x[15] | y[15] | z[15] | radius[15] | first | count | live | reserved |
 /// ```
 ///
-/// Sphere `i < count` is primitive `prim_ids[first + i]`.
+/// Sphere `i < count` is primitive `prim_ids[first + i]`, and can be hit if bit `i` of `live` is set.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub(crate) struct SphereBlock {
@@ -114,7 +122,8 @@ pub(crate) struct SphereBlock {
     pub radius: [f32; SPHERES],
     pub first: u32,
     pub count: u32,
-    pub reserved: [u32; 2],
+    pub live: u32,
+    pub reserved: u32,
 }
 const _: () = assert!(size_of::<SphereBlock>() == 256);
 
@@ -129,7 +138,8 @@ impl SphereBlock {
         radius: [0.0; SPHERES],
         first: 0,
         count: 0,
-        reserved: [0; 2],
+        live: 0,
+        reserved: 0,
     };
 
     /// Centre and radius of sphere `i < 15`, whatever the block holds.
@@ -138,9 +148,14 @@ impl SphereBlock {
         ([self.x[i], self.y[i], self.z[i]], self.radius[i])
     }
 
-    /// The lanes in use, one bit each.
+    /// The lanes that can be hit, one bit each.
     #[inline(always)]
     pub fn lanes(&self) -> u32 {
+        self.live
+    }
+
+    /// The lanes that have a sphere, whether it can be hit or not.
+    pub fn held(&self) -> u32 {
         low_bits(self.count.min(SPHERES as u32))
     }
 }

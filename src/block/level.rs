@@ -20,14 +20,15 @@ use crate::math::Aabb;
 use crate::storage::{self, ALIGNMENT, Plain, align_up};
 
 /// ```text
-/// byte 0        24         28            32     36       40        64
-///      | bounds | children | is linked   | calm | spread | reserved |
+/// byte 0        24          28         32          36     40       44         64
+///      | bounds | instances | children | is linked | calm | spread | reserved |
 /// ```
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct LevelHead {
     /// Around everything, instances and own primitives.
     pub bounds: Aabb,
+    pub instance_count: u32,
     pub child_count: u32,
     /// 1 if children are named by address.
     pub is_linked: u32,
@@ -35,11 +36,11 @@ pub(crate) struct LevelHead {
     pub calm: f32,
     /// For each unit that a ray comes from further away they must be wider by this.
     pub spread: f32,
-    pub reserved: [u32; 6],
+    pub reserved: [u32; 5],
 }
 const _: () = assert!(size_of::<LevelHead>() == 64);
 
-// SAFETY: numbers only; 24 + 4 * 4 + 24 = 64, so no padding.
+// SAFETY: numbers only; 24 + 5 * 4 + 20 = 64, so no padding.
 unsafe impl Plain for LevelHead {}
 
 /// One instance.
@@ -152,8 +153,7 @@ impl<'m> Level<'m> {
     ) -> Option<Self> {
         let bytes = whole.bytes();
         let head = storage::view::<LevelHead>(bytes, own, 1)?.first()?;
-        let (instances, children) =
-            (whole.header().instance_count as usize, head.child_count as usize);
+        let (instances, children) = (head.instance_count as usize, head.child_count as usize);
         let at = LevelOffsets::new(own, instances, children)?;
         Some(Level {
             whole,

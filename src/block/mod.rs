@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! | header | geometries | prim_ids | grids | nodes | bundles | words |
-//! | sphere blocks | triangle blocks | runs | instances ..
+//! | sphere blocks | triangle blocks | runs | motion | instances ..
 //! ```
 //!
 //! Every part starts at a multiple of 64 bytes and is empty in blocks that have no use for it. There
@@ -14,11 +14,13 @@ pub(crate) mod bundle;
 pub(crate) mod cells;
 pub(crate) mod leaf;
 pub(crate) mod level;
+mod motion;
 mod node;
 mod view;
 
 pub(crate) use bundle::Bundles;
 pub(crate) use leaf::Geometry;
+pub(crate) use motion::Motion;
 pub(crate) use node::BvhNode;
 pub(crate) use view::{Block, Finished};
 
@@ -55,6 +57,8 @@ pub(crate) struct Counts {
     pub runs: u32,
     /// Lanes of bundles: their number times their width.
     pub bundle_lanes: u32,
+    /// 1 if the block may be refitted, else 0.
+    pub motions: u32,
 }
 
 /// The first 128 bytes.
@@ -62,10 +66,10 @@ pub(crate) struct Counts {
 /// ```text
 /// byte 0        8            12        16     24     28       32      56
 ///      | magic | byte order | version | size | kind | layout | bounds | ...
-/// byte 56           60                64          68
-///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reach | instances |
-/// byte 88       124     128
-///      | counts | level |
+/// byte 56           60               64           68          72        76        80      84
+///      | mesh count | triangle limit | prim limit | triangles | spheres | ignored | reach | level |
+/// byte 88       128
+///      | counts |
 /// ```
 ///
 /// Flat primitive numbers run through the meshes and then through the sphere sets: below
@@ -88,14 +92,13 @@ pub(crate) struct Header {
     pub ignored_count: u32,
     /// The largest coordinate of `bounds`, infinite where it is not representable.
     pub reach: f32,
-    pub instance_count: u32,
-    pub counts: Counts,
     /// Where what belongs to instances begins, in lines of 64 bytes; 0 if there are none.
     pub level: u32,
+    pub counts: Counts,
 }
 const _: () = assert!(size_of::<Header>() == 128);
 
-// SAFETY: numbers only; 8 + 4 + 4 + 8 + 4 + 4 + 24 + 24 + 8 + 36 + 4 = 128, so no padding.
+// SAFETY: numbers only; 8 + 4 + 4 + 8 + 4 + 4 + 24 + 24 + 8 + 40 = 128, so no padding.
 #[allow(unsafe_code, reason = "a promise about the layout drawn above")]
 unsafe impl Plain for Header {}
 
@@ -111,6 +114,7 @@ pub(crate) struct Offsets {
     pub sphere_blocks: usize,
     pub triangle_blocks: usize,
     pub runs: usize,
+    pub motions: usize,
     pub end: usize,
 }
 
@@ -135,6 +139,7 @@ impl Counts {
             sphere_blocks: part(self.sphere_blocks, size_of::<SphereBlock>())?,
             triangle_blocks: part(self.triangle_blocks, size_of::<TriangleBlock>())?,
             runs: part(self.runs, size_of::<Run>())?,
+            motions: part(self.motions, size_of::<Motion>())?,
             end: 0,
         };
         Some(Offsets { end: usize::try_from(end).ok()?, ..offsets })
@@ -153,6 +158,7 @@ pub(crate) struct PartsMut<'b> {
     pub sphere_blocks: &'b mut [SphereBlock],
     pub triangle_blocks: &'b mut [TriangleBlock],
     pub runs: &'b mut [Run],
+    pub motions: &'b mut [Motion],
     /// What lies behind the last part.
     pub rest: &'b mut [u8],
 }
@@ -172,7 +178,8 @@ impl Counts {
         let (sphere_blocks, rest) = part(rest, self.sphere_blocks, spheres)?;
         let triangles = at.runs - at.triangle_blocks;
         let (triangle_blocks, rest) = part(rest, self.triangle_blocks, triangles)?;
-        let (runs, rest) = part(rest, self.runs, at.end - at.runs)?;
+        let (runs, rest) = part(rest, self.runs, at.motions - at.runs)?;
+        let (motions, rest) = part(rest, self.motions, at.end - at.motions)?;
         Some(PartsMut {
             geometries,
             prim_ids,
@@ -183,6 +190,7 @@ impl Counts {
             sphere_blocks,
             triangle_blocks,
             runs,
+            motions,
             rest,
         })
     }
@@ -201,6 +209,7 @@ impl Counts {
             (at.sphere_blocks, self.sphere_blocks as usize * size_of::<SphereBlock>()),
             (at.triangle_blocks, self.triangle_blocks as usize * size_of::<TriangleBlock>()),
             (at.runs, self.runs as usize * size_of::<Run>()),
+            (at.motions, self.motions as usize * size_of::<Motion>()),
         ];
         for (start, size) in parts {
             let end = start + size;
@@ -215,10 +224,9 @@ impl Counts {
 
 /// Says in the header of a block, whose own primitives are finished, that it has instances as well and ends at byte `size`;
 /// `None` if it is too large for that.
-pub(crate) fn seal_level(bytes: &mut [u8], instances: usize, size: usize) -> Option<()> {
+pub(crate) fn seal_level(bytes: &mut [u8], size: usize) -> Option<()> {
     let header = storage::view_mut::<Header>(bytes, 0, 1)?.first_mut()?;
     header.level = u32::try_from(header.size / ALIGNMENT as u64).ok()?;
-    header.instance_count = instances as u32;
     header.size = size as u64;
     Some(())
 }
@@ -247,6 +255,9 @@ pub(crate) struct Census {
     pub ignored_count: u32,
     /// Whether what is counted as spheres are the boxes of instances.
     pub is_index: bool,
+    /// Whether the block shall be refitted: then everything counts as if it could be hit, as it may some day, and
+    /// vertices are the same if their numbers are.
+    pub refit: bool,
 }
 
 impl Header {
@@ -267,10 +278,19 @@ impl Header {
             sphere_count: census.sphere_count,
             ignored_count: census.ignored_count,
             reach: census.bounds.reach(),
-            instance_count: 0,
-            counts,
             level: 0,
+            counts,
         }
+    }
+
+    /// What has moved can be hit, or not, at other places.
+    pub fn renew(&mut self, bounds: Aabb, triangle_count: u32, sphere_count: u32) {
+        self.bounds = bounds;
+        self.reach = bounds.reach();
+        self.triangle_count = triangle_count;
+        self.sphere_count = sphere_count;
+        self.ignored_count =
+            self.prim_limit.saturating_sub(triangle_count.saturating_add(sphere_count));
     }
 }
 
@@ -299,6 +319,7 @@ mod tests {
             triangle_blocks: most,
             runs: most,
             bundle_lanes: most,
+            motions: most,
         };
         // Two terabytes: addressable with 64 bits, refused with 32.
         assert_eq!(counts.offsets().is_some(), usize::BITS == 64);

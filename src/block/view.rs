@@ -6,7 +6,7 @@ use super::bundle::Bundles;
 use super::cells::{GridHead, Run};
 use super::leaf::{Geometry, SphereBlock, TriangleBlock};
 use super::level::Level;
-use super::{BYTE_ORDER, BvhNode, Counts, Header, LAYOUT_COMPACT, MAGIC, VERSION};
+use super::{BYTE_ORDER, BvhNode, Counts, Header, LAYOUT_COMPACT, MAGIC, Motion, VERSION};
 use crate::error::OpenError;
 use crate::storage::{self, ALIGNMENT};
 
@@ -59,7 +59,7 @@ impl<'m> Finished<'m> {
         let has_level = header.level != 0;
         let ends = match has_level {
             true => u64::from(header.level) * ALIGNMENT as u64 == end as u64,
-            false => header.instance_count == 0 && header.size == end as u64,
+            false => header.size == end as u64,
         };
         let size = usize::try_from(header.size).map_err(|_| OpenError::Corrupt)?;
         if !ends || size < end {
@@ -75,7 +75,7 @@ impl<'m> Finished<'m> {
     /// The same for a block without instances.
     pub fn split_plain(bytes: &'m [u8]) -> Result<Self, OpenError> {
         let (header, end) = front(bytes)?;
-        if header.level != 0 || header.instance_count != 0 || header.size != end as u64 {
+        if header.level != 0 || header.size != end as u64 {
             return Err(OpenError::Corrupt);
         }
         bytes.get(..end).map(Finished).ok_or(OpenError::Truncated)
@@ -100,6 +100,13 @@ impl<'m> Finished<'m> {
     pub fn header(self) -> &'m Header {
         // SAFETY: whoever made this has found an aligned header in front.
         unsafe { &*self.0.as_ptr().cast() }
+    }
+
+    /// What it keeps for refitting, if it may be.
+    pub fn motion(self) -> Option<&'m Motion> {
+        let counts = &self.header().counts;
+        let at = counts.offsets()?.motions;
+        storage::view(self.0, at, counts.motions as usize)?.first()
     }
 
     /// All of it.
@@ -174,7 +181,7 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
     let counts = &header.counts;
     let width = if header.layout == LAYOUT_COMPACT { u32::MAX } else { header.layout };
     let end = counts.offsets().ok_or(OpenError::Corrupt)?.end;
-    if counts.bundle_lanes % width != 0 {
+    if counts.bundle_lanes % width != 0 || counts.motions > 1 {
         return Err(OpenError::Corrupt);
     }
     Ok((header, end))

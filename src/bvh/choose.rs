@@ -3,10 +3,9 @@
 use core::ops::Range;
 
 use super::collapse::{Grounds, Results};
-use crate::block::{BvhNode, Geometry};
+use crate::block::BvhNode;
 use crate::caller::{Caller, PARTS};
-use crate::prim::Shapes;
-use crate::scene::Scene;
+use crate::prim::Source;
 
 /// Subtrees of fewer pairs are not parted.
 const SMALL: usize = 512;
@@ -16,8 +15,7 @@ const SMALL: usize = 512;
 /// Source: \[Wald08\] for the wide tree, \[Ylitie17\], 3.1, for the dynamic program.
 pub(crate) fn choose<const W: usize>(
     grounds: &Grounds,
-    scene: &Scene,
-    geometries: &[Geometry],
+    source: Source,
     caller: &Caller,
     choices: &mut [u64],
 ) -> Option<()> {
@@ -32,13 +30,13 @@ pub(crate) fn choose<const W: usize>(
     }
     caller.for_each(&mut jobs, |job| {
         if let Some((pairs, choices, decided)) = job {
-            let (mut results, mut shapes) = (Results::<W>::NONE, Shapes::new(scene, geometries));
+            let (mut results, mut shapes) = (Results::<W>::NONE, source.shapes());
             let done = results.decide(grounds, pairs.clone(), &mut shapes, choices);
             *decided = done.and_then(|()| results.only());
         }
     });
     let decided = jobs.map(|job| job.and_then(|(_, _, decided)| decided));
-    let (mut results, mut shapes) = (Results::<W>::NONE, Shapes::new(scene, geometries));
+    let (mut results, mut shapes) = (Results::<W>::NONE, source.shapes());
     let mut end = choices.len() + 1;
     for (pairs, decided) in subtrees.all().iter().zip(decided).rev() {
         let between = choices.get_mut(pairs.end - 1..end - 1)?;

@@ -10,7 +10,7 @@ use super::tree::{Grown, Limits};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
-use crate::prim::{Packer, Shapes, Survey, geometries};
+use crate::prim::{Packer, Source, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage;
 
@@ -46,6 +46,7 @@ impl Plan {
         let packing = Counts {
             sphere_blocks: spheres.div_ceil(SPHERES as u32),
             triangle_blocks: triangles.div_ceil(TRIANGLES_AT_LEAST as u32),
+            motions: census.refit.into(),
             ..growing
         };
         let refs = (prims as usize).checked_mul(size_of::<PrimRef>());
@@ -121,7 +122,7 @@ fn pack_leaves(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]
     let (triangles, spheres) = prim_ids.split_at(census.triangle_count as usize);
     let (mut triangles, mut spheres) = (triangles.iter(), spheres.iter());
     let mut packer = Packer::new(triangle_blocks, sphere_blocks, 0, census.triangle_count);
-    let mut shapes = Shapes::new(scene, geometries);
+    let mut shapes = Source { scene, geometries, named: census.refit }.shapes();
     for_each_leaf(nodes, |node| {
         let (count, is_sphere) = Grown::of(node);
         let ids = if is_sphere { &mut spheres } else { &mut triangles };

@@ -196,6 +196,7 @@ mod tests {
     use crate::bvh::tree::Limits;
     use crate::caller::Caller;
     use crate::math::Aabb;
+    use crate::prim::Source;
     use crate::scene::Scene;
     use std::vec::Vec;
 
@@ -296,7 +297,8 @@ mod tests {
         let mut choices = [0; LEAVES - 1];
         let scene = Scene::new(&[], &[]);
         let grounds = Grounds { nodes, ids: &[], areas: areas(), price: PRICE, alone: false };
-        choose::<W>(&grounds, &scene, &[], &Caller::new(None, None), &mut choices).expect("a tree");
+        let source = Source { scene: &scene, geometries: &[], named: false };
+        choose::<W>(&grounds, source, &Caller::new(None, None), &mut choices).expect("a tree");
         let area = |node: u32| areas().of(&nodes[node as usize].aabb());
         let mut sum = area(0) + PRICE * (28 * W) as f32 / 256.0;
         Chosen { nodes, choices: &choices, ids: &[] }

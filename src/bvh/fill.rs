@@ -1,10 +1,10 @@
 //! Fills the leaf blocks of the wide layouts, from the ids in the order of the tree.
 
 use super::emit::BEGINS;
+use crate::block::PartsMut;
 use crate::block::leaf::{SphereBlock, TriangleBlock};
-use crate::block::{Geometry, PartsMut};
 use crate::caller::{Caller, PARTS};
-use crate::prim::{AHEAD, GRAIN, Packer, Shapes};
+use crate::prim::{AHEAD, GRAIN, Packer, Source};
 use crate::scene::Scene;
 
 /// The ids of some leaf blocks, and those blocks.
@@ -17,16 +17,17 @@ struct Run<'b> {
     packed: Option<()>,
 }
 
-/// Packs the leaf blocks and takes the marks off the ids, of which those of spheres begin at `first_sphere`.
+/// Packs the leaf blocks, over `named` vertices if they will move, and takes the marks off the ids, of which those of spheres begin at `first_sphere`.
 ///
 /// Each run begins with a block, so where runs begin does not matter.
 pub(super) fn pack(
-    scene: &Scene,
+    (scene, named): (&Scene, bool),
     first_sphere: usize,
     parts: PartsMut,
     caller: &Caller,
 ) -> Option<()> {
     let PartsMut { geometries, prim_ids, sphere_blocks, triangle_blocks, .. } = parts;
+    let source = Source { scene, geometries, named };
     let size = caller.part_size(prim_ids.len(), GRAIN);
     let prim_count = prim_ids.len();
     let (mut ids, mut triangles, mut spheres) = (prim_ids, triangle_blocks, sphere_blocks);
@@ -44,19 +45,19 @@ pub(super) fn pack(
     }
     caller.for_each(&mut runs, |run| {
         if let Some(run) = run {
-            run.packed = run.pack(scene, geometries, first_sphere);
+            run.packed = run.pack(source, first_sphere);
         }
     });
     runs.iter().flatten().try_for_each(|run| run.packed)
 }
 
 impl Run<'_> {
-    fn pack(&mut self, scene: &Scene, geometries: &[Geometry], first_sphere: usize) -> Option<()> {
+    fn pack(&mut self, source: Source, first_sphere: usize) -> Option<()> {
         let (first, first_sphere) = (self.first as u32, self.first.max(first_sphere) as u32);
         let (triangles, spheres) = (&mut *self.triangle_blocks, &mut *self.sphere_blocks);
         let block_count = triangles.len();
         let mut packer = Packer::new(triangles, spheres, first, first_sphere);
-        let mut shapes = Shapes::new(scene, geometries);
+        let mut shapes = source.shapes();
         for i in 0..self.ids.len() {
             if let Some(id) = self.ids.get(i + AHEAD) {
                 shapes.prefetch(id & !BEGINS);

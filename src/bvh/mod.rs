@@ -12,6 +12,7 @@ mod emit;
 mod fill;
 mod fits;
 mod order;
+mod refit;
 mod refs;
 mod reinsert;
 mod spatial;
@@ -28,6 +29,7 @@ use crate::caller::Caller;
 
 pub(crate) use bins::Effort;
 pub(crate) use compact::{build, needs};
+pub(crate) use refit::{Cost, refit_bundles, refit_nodes};
 pub(crate) use stack::Columns;
 pub(crate) use traverse::traverse;
 pub(crate) use validate::{bundles_are_sound, tree_is_sound};

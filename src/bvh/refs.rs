@@ -8,8 +8,7 @@ use super::split::{Areas, Box4};
 use crate::block::Census;
 use crate::caller::{Caller, PARTS};
 use crate::math::Aabb;
-use crate::prim::{GRAIN, Prim, Shape, for_each_prim_in};
-
+use crate::prim::{GRAIN, Prim, Shape, for_each_named_in, for_each_prim_in};
 use crate::scene::Scene;
 use crate::storage::Plain;
 
@@ -104,7 +103,7 @@ pub(crate) fn gather(
     }
     caller.for_each(&mut parts, |part| {
         if let Some(part) = part {
-            part.gather(scene, sound, strips);
+            part.gather(scene, census, strips);
         }
     });
     let sizes = parts.map(|part| part.map_or((0, 0), |part| (part.refs.len(), part.count)));
@@ -136,12 +135,15 @@ struct Part<'r> {
 impl Part<'_> {
     /// Writes the refs. With `strips`, up to so many triangles go as one, but never across a multiple of [`GRAIN`], so that
     /// it does not matter where parts begin.
-    fn gather(&mut self, scene: &Scene, sound: bool, strips: Option<(usize, Areas)>) {
+    fn gather(&mut self, scene: &Scene, census: &Census, strips: Option<(usize, Areas)>) {
         let ids = self.ids.start as u32..self.ids.end as u32;
+        let sound = census.ignored_count == 0;
         // The last triangle.
         let mut last: Option<(u32, [[f32; 3]; 3])> = None;
-        for_each_prim_in(scene, ids, sound, |Prim { id, shape }| {
-            let new = PrimRef::new(id, &shape.aabb(), !shape.is_triangle());
+        for_each_named_in(scene, ids, sound, |Prim { id, shape }, names| {
+            let aabb = if census.refit { shape.place(&census.bounds) } else { shape.aabb() };
+            let new = PrimRef::new(id, &aabb, !shape.is_triangle());
+            let shape = if census.refit { names.of(shape) } else { shape };
             let (Some(strips), Shape::Triangle(corners)) = (strips, shape) else {
                 return self.push(new);
             };

@@ -3,26 +3,11 @@
 use super::clip::clip;
 use super::refs::PrimRef;
 use super::split::{Areas, Box4, greater, lesser};
-use crate::block::Geometry;
 use crate::math::Aabb;
 use crate::prim::Shapes;
-use crate::scene::Scene;
 
 /// Slabs along each axis.
 const SLABS: usize = 16;
-
-/// Where the shapes of refs are looked up.
-#[derive(Clone, Copy)]
-pub(crate) struct Source<'s, 'a> {
-    pub scene: &'s Scene<'a, 'a>,
-    pub geometries: &'s [Geometry],
-}
-
-impl<'s, 'a> Source<'s, 'a> {
-    pub fn shapes(&self) -> Shapes<'s, 'a> {
-        Shapes::new(self.scene, self.geometries)
-    }
-}
 
 /// A box in equal slabs along each axis.
 #[derive(Clone, Copy)]

@@ -5,12 +5,12 @@ use super::bins::{Bins, Effort, best_plane};
 use super::branch::Branch;
 use super::budget::{fewest_leaves, levels_to_halve};
 use super::refs::PrimRef;
-use super::spatial::{Source, best_cut, overlap};
+use super::spatial::{best_cut, overlap};
 use super::split::{Areas, Extent};
 use super::sweep::{FEW, sweep};
 use crate::block::BvhNode;
 use crate::math::Aabb;
-use crate::prim::Shapes;
+use crate::prim::{Shapes, Source};
 
 /// A leaf that has no lanes yet. `first` is its first ref and, in the end, the number of primitives in the leaves
 /// before; `lanes` holds what it has:
@@ -108,7 +108,7 @@ pub(super) struct Scratch<'s, 'a> {
 
 impl<'s, 'a> Splitter<'_, 's, 'a> {
     pub fn scratch(self) -> Scratch<'s, 'a> {
-        let shapes = self.limits.source.as_ref().map(Source::shapes);
+        let shapes = self.limits.source.map(Source::shapes);
         Scratch { bins: Bins::EMPTY, shapes }
     }
 

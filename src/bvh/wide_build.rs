@@ -10,7 +10,6 @@ use super::emit::{Chosen, Sizes};
 use super::fill::pack;
 use super::refs::{PrimRef, gather};
 use super::reinsert::mend;
-use super::spatial::Source;
 use super::split::Areas;
 use super::tree::Limits;
 use crate::block::bundle::{Bundle, LANE};
@@ -18,7 +17,7 @@ use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, Geometry, KIND_BVH, PartsMut};
 use crate::caller::Caller;
 use crate::error::BuildError;
-use crate::prim::{Survey, geometries};
+use crate::prim::{Source, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT, Plain};
 
@@ -112,19 +111,21 @@ pub(crate) fn needs_wide(
     let lanes = 3 * u64::from(triangle_blocks + sphere_blocks) / 2;
     let bundles = 2 + lanes / u64::from(width);
     let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks };
-    let finished =
-        counts(survey, census.hittable(), &sizes, width).offsets().ok_or(BuildError::TooLarge)?;
+    let finished = counts(survey, census, census.hittable(), &sizes, width)
+        .offsets()
+        .ok_or(BuildError::TooLarge)?;
     Ok((compact.max(finished.end), minimum))
 }
 
 /// The parts of the finished block.
-fn counts(survey: &Survey, prim_ids: u32, sizes: &Sizes, width: u32) -> Counts {
+fn counts(survey: &Survey, census: &Census, prim_ids: u32, sizes: &Sizes, width: u32) -> Counts {
     Counts {
         geometries: survey.geometry_count,
         prim_ids,
         bundle_lanes: sizes.bundles.saturating_mul(width),
         sphere_blocks: sizes.sphere_blocks,
         triangle_blocks: sizes.triangle_blocks,
+        motions: census.refit.into(),
         ..Counts::default()
     }
 }
@@ -177,14 +178,14 @@ where
     let whole = areas.of(&census.bounds);
     let mean = whole / prims as f32;
     for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
-        let worth = Worth { areas, price, alone: census.is_index };
+        let worth = Worth { areas, price, census };
         let sizes = scratch.choose::<W>(scene, survey, worth, how.caller, bytes)?;
-        let counts = counts(survey, prims, &sizes, W as u32);
+        let counts = counts(survey, census, prims, &sizes, W as u32);
         let at = counts.offsets()?;
         if at.words <= scratch.choices && at.end <= bytes.len() {
             how.caller.done(0.85)?;
             scratch.emit::<W>(first_sphere, &counts, bytes)?;
-            pack(scene, first_sphere, counts.parts_mut(bytes)?, how.caller)?;
+            pack((scene, census.refit), first_sphere, counts.parts_mut(bytes)?, how.caller)?;
             return counts.seal(KIND_BVH, W as u32, census, bytes);
         }
     }
@@ -207,8 +208,8 @@ fn grow_tree(
     let Gathered { count, strip, leaves } = gather_strips(scene, census, places.leaves, how, refs);
     let uneven = how.effort.for_uneven(unevenness(refs.get(..count)?, areas, how.caller));
     let mends = uneven.is_some_and(|effort| effort.mends);
-    // Spheres are not cut.
-    let cut = mends && census.sphere_count == 0;
+    // Spheres are not cut, nor is what will move.
+    let cut = mends && census.sphere_count == 0 && !census.refit;
     let places = match mends {
         true => places.for_uneven(cut, bytes.len()),
         false => Places { leaves, ..places },
@@ -220,7 +221,7 @@ fn grow_tree(
     let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
     let limits = Limits {
         leaves: places.leaves,
-        source: cut.then_some(Source { scene, geometries }),
+        source: cut.then_some(Source { scene, geometries, named: false }),
         leaf_max: leaf_max(census, strip),
         mixed: census.is_mixed(),
         deep: true,
@@ -281,10 +282,10 @@ fn ids_to_end<'p>(place: &'p mut [u8], size: &Size) -> Option<(&'p mut [u8], &'p
 
 /// What decides what becomes of nodes, as in [`Grounds`].
 #[derive(Clone, Copy)]
-struct Worth {
+struct Worth<'c> {
     areas: Areas,
     price: f32,
-    alone: bool,
+    census: &'c Census,
 }
 
 /// The tree, its choices and the ids, at the end of the memory.
@@ -310,7 +311,7 @@ impl Scratch {
         &self,
         scene: &Scene,
         survey: &Survey,
-        Worth { areas, price, alone }: Worth,
+        Worth { areas, price, census }: Worth,
         caller: &Caller,
         bytes: &mut [u8],
     ) -> Option<Sizes> {
@@ -321,8 +322,10 @@ impl Scratch {
         let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
         let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
         let geometries = table.parts_mut(front)?.geometries;
+        let alone = census.is_index;
         let grounds = Grounds { nodes, ids, areas, price, alone };
-        choose::<W>(&grounds, scene, geometries, caller, choices)?;
+        let source = Source { scene, geometries, named: census.refit };
+        choose::<W>(&grounds, source, caller, choices)?;
         Chosen { nodes, choices, ids }.sizes::<W>()
     }
 

@@ -331,6 +331,8 @@ impl RtInfo {
             structure_size: info.structure_size,
             leaf_size: info.leaf_size,
             id_size: info.id_size,
+            refit: info.cost_growth.is_some().into(),
+            cost_growth: info.cost_growth.unwrap_or(0.0),
         }
     }
 }

@@ -8,6 +8,7 @@ mod build;
 mod control;
 mod lender;
 mod query;
+mod refit;
 mod scene;
 mod status;
 mod types;

@@ -2,7 +2,7 @@
 
 use core::ffi::{CStr, c_char};
 
-use crate::error::{BuildError, OpenError};
+use crate::error::{BuildError, OpenError, RefitError};
 
 /// Success is zero, everything else says why a call was refused. A number keeps its meaning for
 /// ever; `rt_status_message` puts it in words.
@@ -46,12 +46,16 @@ pub const RT_ERROR_NOT_FOUND: RtStatus = 15;
 pub const RT_ERROR_INTERNAL: RtStatus = 16;
 /// `progress` returned false. The memory holds no structure and may be used again.
 pub const RT_ERROR_CANCELLED: RtStatus = 17;
+/// The block was not built with `RtBuildOptions.refit`, or it is a grid, which is built anew instead.
+pub const RT_ERROR_NOT_REFITTABLE: RtStatus = 18;
+/// Meshes, sphere sets, counts or vertex numbers are not those of the build.
+pub const RT_ERROR_OTHER_SCENE: RtStatus = 19;
 /// The map of an instance is not finite, or flattens space and has no inverse.
-pub const RT_ERROR_SINGULAR: RtStatus = 19;
+pub const RT_ERROR_SINGULAR: RtStatus = 20;
 /// The accel of an instance has instances itself: there are two levels.
-pub const RT_ERROR_NESTED: RtStatus = 20;
+pub const RT_ERROR_NESTED: RtStatus = 21;
 /// The block refers to other blocks by address: `rt_accel_pack` makes one of them that can be copied and saved.
-pub const RT_ERROR_LINKED: RtStatus = 21;
+pub const RT_ERROR_LINKED: RtStatus = 22;
 
 /// Why a call was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,6 +80,8 @@ pub(crate) enum Error {
     Singular,
     Nested,
     Linked,
+    NotRefittable,
+    OtherScene,
 }
 
 impl Error {
@@ -101,6 +107,8 @@ impl Error {
             Error::Singular => RT_ERROR_SINGULAR,
             Error::Nested => RT_ERROR_NESTED,
             Error::Linked => RT_ERROR_LINKED,
+            Error::NotRefittable => RT_ERROR_NOT_REFITTABLE,
+            Error::OtherScene => RT_ERROR_OTHER_SCENE,
         }
     }
 }
@@ -118,7 +126,16 @@ impl From<BuildError> for Error {
             BuildError::SingularInstance { .. } => Error::Singular,
             BuildError::NestedInstance { .. } => Error::Nested,
             BuildError::Cancelled => Error::Cancelled,
-            BuildError::Unsupported(_) => Error::Unsupported,
+        }
+    }
+}
+
+impl From<RefitError> for Error {
+    fn from(error: RefitError) -> Error {
+        match error {
+            RefitError::NotRefittable => Error::NotRefittable,
+            RefitError::OtherScene => Error::OtherScene,
+            RefitError::NoBlock(error) => error.into(),
         }
     }
 }
@@ -161,6 +178,8 @@ fn message(status: RtStatus) -> &'static CStr {
         RT_ERROR_SINGULAR => c"the map of an instance has no inverse or is not finite",
         RT_ERROR_NESTED => c"the accel of an instance has instances itself",
         RT_ERROR_LINKED => c"the block refers to other blocks by address and was not packed",
+        RT_ERROR_NOT_REFITTABLE => c"the block was not built to be refitted",
+        RT_ERROR_OTHER_SCENE => c"meshes, counts or vertex numbers are not those of the build",
         _ => c"an unknown status",
     }
 }

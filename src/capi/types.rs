@@ -193,7 +193,8 @@ pub struct RtBuildOptions {
     pub quality: u32,
     /// One of `RT_LAYOUT_`, for a BVH.
     pub layout: u32,
-    /// 1: the block can be refitted when vertices move. Unsupported so far.
+    /// 1: the block can be refitted when vertices move, unless it is a grid: see `rt_accel_refit`. `rt_build` then makes no
+    /// grid.
     pub refit: u32,
     /// One of `RT_PLAIN_LIST_`.
     pub plain_list: u32,
@@ -294,6 +295,11 @@ pub struct RtInfo {
     pub leaf_size: usize,
     /// Bytes of primitive numbers.
     pub id_size: usize,
+    /// 1 if the block can be refitted.
+    pub refit: u32,
+    /// What a ray costs by the surface area heuristic, over that when the block was built: from about 2 on a new build is
+    /// likely to pay. 0 if the block cannot be refitted.
+    pub cost_growth: f32,
 }
 
 /// Layouts with `P` for the size of a pointer or a `size_t`, in bytes:
@@ -306,7 +312,7 @@ pub struct RtInfo {
 /// RtBuildOptions  0 struct_size .. worker_count | 24 user parallel_for progress | 24 + 3P grid_kind .. rays_per_prim |
 ///                 40 + 3P
 /// RtInfo          0 struct_size kind layout | 12 lower upper | 36 counts | 52 resolution |
-///                 64 size structure_size leaf_size id_size | 64 + 4P
+///                 64 size structure_size leaf_size id_size | 64 + 4P refit cost_growth | 72 + 4P
 /// ```
 const _: () = {
     const P: usize = size_of::<usize>();
@@ -315,7 +321,7 @@ const _: () = {
     assert!(size_of::<RtInstance>() == P + 56 && size_of::<RtScene>() == 3 * P + 32);
     assert!(size_of::<RtBuildOptions>() == 3 * P + 40 && size_of::<RtQuery>() == 32);
     assert!(size_of::<RtMemory>() == 3 * P && size_of::<RtSurface>() == 56);
-    assert!(size_of::<RtInfo>() == 4 * P + 64);
+    assert!(size_of::<RtInfo>() == 4 * P + 72);
     assert!(core::mem::offset_of!(RtScene, meshes) == 32);
     assert!(core::mem::offset_of!(RtBuildOptions, user) == 24);
     assert!(core::mem::offset_of!(RtInfo, size) == 64);
@@ -341,7 +347,10 @@ unsafe impl Growing for RtQuery {}
 // SAFETY: as above.
 unsafe impl Growing for RtSurface {}
 // SAFETY: as above.
-unsafe impl Growing for RtInfo {}
+unsafe impl Growing for RtInfo {
+    /// Up to `id_size`.
+    const FIRST_SIZE: usize = 64 + 4 * size_of::<usize>();
+}
 
 // SAFETY: it begins with `struct_size`.
 unsafe impl Versioned for RtScene {}

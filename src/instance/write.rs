@@ -29,11 +29,12 @@ pub(crate) fn write(
         at.parts_mut(bytes, instances, child_count)?;
     *head = LevelHead {
         bounds: placed.bounds,
+        instance_count: instances as u32,
         child_count: child_count as u32,
         is_linked: 1,
         calm: placed.calm,
         spread: placed.spread,
-        reserved: [0; 6],
+        reserved: [0; 5],
     };
     for (i, record) in records.iter_mut().enumerate() {
         let placing = placed.get(i)?;
@@ -50,7 +51,7 @@ pub(crate) fn write(
     rest.fill(0);
     let size = at.index + build_index(rest)?;
     zero_gaps(&at, instances, child_count, bytes)?;
-    seal_level(bytes, instances, size)?;
+    seal_level(bytes, size)?;
     Some(size)
 }
 

@@ -2,6 +2,7 @@
 
 use core::ops::Range;
 
+use super::names::Names;
 use crate::block::{Census, Geometry};
 use crate::caller::Caller;
 use crate::error::BuildError;
@@ -50,7 +51,7 @@ pub(crate) struct Survey {
 impl Shape {
     /// The shape, if it can be hit: finite, with area or radius.
     #[inline(always)]
-    fn sound(self) -> Option<Shape> {
+    pub fn sound(self) -> Option<Shape> {
         let sound = match self {
             Shape::Triangle(corners) => {
                 // Looked at all together: a branch for each takes longer. Zero unless one is infinite or NaN.
@@ -64,6 +65,18 @@ impl Shape {
             Shape::Box(aabb) => aabb.lower[0] <= aabb.upper[0],
         };
         sound.then_some(self)
+    }
+
+    /// The box of a shape that perhaps cannot be hit, for a builder: within `bounds`, and finite if those are.
+    pub fn place(self, bounds: &Aabb) -> Aabb {
+        if let Some(sound) = self.sound() {
+            return sound.aabb();
+        }
+        match self {
+            Shape::Triangle(corners) => Aabb::around(&corners.map(|v| bounds.nearest(v))),
+            Shape::Sphere { centre, .. } => Aabb::around(&[bounds.nearest(centre)]),
+            Shape::Box(aabb) => aabb,
+        }
     }
 
     /// A box around the shape; for triangles the smallest. It may be infinite for huge spheres.
@@ -127,13 +140,14 @@ pub(crate) fn survey(scene: &Scene) -> Result<Survey, BuildError> {
     })
 }
 
-/// Calls `f` with the numbers in `range` and what has them; `None` for a triangle without vertices.
+/// Calls `f` with the numbers in `range` and what has them, `None` for a triangle without vertices; and with what knows
+/// its vertices by name.
 #[inline]
-fn for_each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut(u32, Option<Shape>)) {
+fn for_each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut(u32, Option<Shape>, Names)) {
     let Range { start, end } = range;
     if let Some(boxes) = scene.boxes() {
         return (start..end.min(boxes.count() as u32))
-            .for_each(|i| f(i, Some(Shape::Box(boxes.aabb(i as usize)))));
+            .for_each(|i| f(i, Some(Shape::Box(boxes.aabb(i as usize))), Names(None)));
     }
     let mut first = 0;
     // The part of a geometry with `count` primitives that is in the range.
@@ -145,20 +159,16 @@ fn for_each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut(u32, Optio
     for mesh in (0..scene.mesh_count()).filter_map(|m| scene.mesh(m)) {
         let (base, part) = next(mesh.triangle_count());
         for i in part {
-            f(base + i, mesh.triangle(i as usize).map(Shape::Triangle));
+            let shape = mesh.triangle(i as usize).map(Shape::Triangle);
+            f(base + i, shape, Names(Some((&mesh, base, i))));
         }
     }
     for set in (0..scene.sphere_set_count()).filter_map(|s| scene.sphere_set(s)) {
         let (base, part) = next(set.sphere_count());
         for i in part {
-            f(base + i, set.sphere(i as usize).map(sphere));
+            f(base + i, set.sphere(i as usize).map(sphere), Names(None));
         }
     }
-}
-
-/// Calls `f` with each primitive that can be hit, in the order of flat numbers.
-pub(crate) fn for_each_prim(scene: &Scene, f: impl FnMut(Prim)) {
-    for_each_prim_in(scene, 0..u32::MAX, false, f);
 }
 
 /// Calls `f` with each primitive that can be hit: quickly if the census found none that cannot.
@@ -175,10 +185,21 @@ pub(crate) fn for_each_prim_in(
     sound: bool,
     mut f: impl FnMut(Prim),
 ) {
-    for_each_shape(scene, range, |id, shape| {
+    for_each_named_in(scene, range, sound, |prim, _| f(prim));
+}
+
+/// The same with the names of vertices.
+#[inline]
+pub(crate) fn for_each_named_in(
+    scene: &Scene,
+    range: Range<u32>,
+    sound: bool,
+    mut f: impl FnMut(Prim, Names),
+) {
+    for_each_shape(scene, range, |id, shape, names| {
         if let Some(shape) = shape.and_then(|shape| if sound { Some(shape) } else { shape.sound() })
         {
-            f(Prim { id, shape });
+            f(Prim { id, shape }, names);
         }
     });
 }
@@ -186,16 +207,30 @@ pub(crate) fn for_each_prim_in(
 /// So many ids ahead shapes are fetched: about one fetch from memory takes as long.
 pub(crate) const AHEAD: usize = 16;
 
+/// Where shapes are looked up.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'s, 'a> {
+    pub scene: &'s Scene<'a, 'a>,
+    pub geometries: &'s [Geometry],
+    /// Whether triangles shall have the [names](Mesh::names) of their vertices in place of these.
+    pub named: bool,
+}
+
+impl<'s, 'a> Source<'s, 'a> {
+    pub fn shapes(self) -> Shapes<'s, 'a> {
+        Shapes { source: self, mesh: None }
+    }
+}
+
 /// Finds shapes by their flat numbers, quickly if the next one is of the same mesh.
 pub(crate) struct Shapes<'s, 'a> {
-    scene: &'s Scene<'a, 'a>,
-    geometries: &'s [Geometry],
+    source: Source<'s, 'a>,
     mesh: Option<(u32, Mesh<'a>)>,
 }
 
 impl<'s, 'a> Shapes<'s, 'a> {
     pub fn new(scene: &'s Scene<'a, 'a>, geometries: &'s [Geometry]) -> Self {
-        Shapes { scene, geometries, mesh: None }
+        Source { scene, geometries, named: false }.shapes()
     }
 
     /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
@@ -211,31 +246,36 @@ impl<'s, 'a> Shapes<'s, 'a> {
     #[inline]
     pub fn get(&mut self, id: u32) -> Option<Shape> {
         if let Some((first, mesh)) = &self.mesh
-            && let Some(triangle) = id.checked_sub(*first).and_then(|i| mesh.triangle(i as usize))
+            && let Some(triangle) =
+                id.checked_sub(*first).and_then(|i| self.triangle(*first, mesh, i))
         {
-            return Some(Shape::Triangle(triangle));
+            return Some(triangle);
         }
         self.find(id)
     }
 
+    #[inline]
+    fn triangle(&self, first: u32, mesh: &Mesh, i: u32) -> Option<Shape> {
+        if self.source.named {
+            return mesh.names(first, i as usize).map(Shape::Triangle);
+        }
+        mesh.triangle(i as usize).map(Shape::Triangle)
+    }
+
     #[cold]
     fn find(&mut self, id: u32) -> Option<Shape> {
-        let (number, geometry) = geometry_of(id, self.geometries)?;
-        self.mesh = self.scene.mesh(number as usize).map(|mesh| (geometry.first, mesh));
-        shape(self.scene, self.geometries, id)
-    }
-}
-
-/// The shape with flat number `id`, whether it can be hit or not.
-fn shape(scene: &Scene, geometries: &[Geometry], id: u32) -> Option<Shape> {
-    if let Some(boxes) = scene.boxes() {
-        return Some(Shape::Box(boxes.aabb(id as usize)));
-    }
-    let (number, geometry) = geometry_of(id, geometries)?;
-    let prim = (id - geometry.first) as usize;
-    match (number as usize).checked_sub(scene.mesh_count()) {
-        None => scene.mesh(number as usize)?.triangle(prim).map(Shape::Triangle),
-        Some(set) => scene.sphere_set(set)?.sphere(prim).map(sphere),
+        let Source { scene, geometries, .. } = self.source;
+        if let Some(boxes) = scene.boxes() {
+            return Some(Shape::Box(boxes.aabb(id as usize)));
+        }
+        let (number, geometry) = geometry_of(id, geometries)?;
+        let (number, first) = (number as usize, geometry.first);
+        let prim = id - first;
+        self.mesh = scene.mesh(number).map(|mesh| (first, mesh));
+        match number.checked_sub(scene.mesh_count()) {
+            None => self.triangle(first, &scene.mesh(number)?, prim),
+            Some(set) => scene.sphere_set(set)?.sphere(prim as usize).map(sphere),
+        }
     }
 }
 
@@ -245,17 +285,25 @@ fn sphere([x, y, z, radius]: [f32; 4]) -> Shape {
 
 /// Writes the first number and the mask of each geometry.
 pub(crate) fn geometries(scene: &Scene, out: &mut [Geometry]) {
+    for (out, geometry) in out.iter_mut().zip(geometry_table(scene)) {
+        *out = geometry;
+    }
+}
+
+/// The first number and the mask of each geometry.
+pub(crate) fn geometry_table(scene: &Scene) -> impl Iterator<Item = Geometry> {
     let meshes = (0..scene.mesh_count())
         .filter_map(|m| scene.mesh(m))
         .map(|mesh| (mesh.triangle_count(), mesh.mask()));
     let sets = (0..scene.sphere_set_count())
         .filter_map(|s| scene.sphere_set(s))
         .map(|set| (set.sphere_count(), set.mask()));
-    let mut first = 0;
-    for (out, (count, mask)) in out.iter_mut().zip(meshes.chain(sets)) {
-        *out = Geometry { first, mask };
-        first += count as u32;
-    }
+    let mut next = 0;
+    meshes.chain(sets).map(move |(count, mask)| {
+        let first = next;
+        next += count as u32;
+        Geometry { first, mask }
+    })
 }
 
 impl Census {
@@ -270,6 +318,7 @@ impl Census {
             sphere_count: 0,
             ignored_count: 0,
             is_index: scene.boxes().is_some(),
+            refit: false,
         };
         let none = census;
         let count = survey.prim_limit as usize;
@@ -287,7 +336,7 @@ impl Census {
     fn tally(&mut self, scene: &Scene, range: Range<usize>) -> Result<(), u32> {
         let range = range.start as u32..range.end as u32;
         let mut missing = None;
-        for_each_shape(scene, range, |id, shape| match shape.map(Shape::sound) {
+        for_each_shape(scene, range, |id, shape, _| match shape.map(Shape::sound) {
             Some(Some(shape)) => {
                 self.bounds.add(&shape.aabb());
                 match shape {
@@ -306,6 +355,19 @@ impl Census {
         self.triangle_count += other.triangle_count;
         self.sphere_count += other.sphere_count;
         self.ignored_count += other.ignored_count;
+    }
+
+    /// The same for a block that shall be refitted.
+    pub fn for_refit(&self) -> Census {
+        let nothing = self.bounds == Aabb::EMPTY;
+        Census {
+            bounds: if nothing { Aabb::around(&[[0.0; 3]]) } else { self.bounds },
+            triangle_count: self.triangle_limit,
+            sphere_count: self.prim_limit - self.triangle_limit,
+            ignored_count: 0,
+            refit: true,
+            ..*self
+        }
     }
 
     /// The number of primitives that can be hit.

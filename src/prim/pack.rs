@@ -1,6 +1,6 @@
 //! Fills leaf blocks, each to the end before the next.
 
-use super::gather::{Shape, for_each_prim, geometries};
+use super::gather::{Shape, for_each_named_in, geometries};
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock,
     block_ref,
@@ -10,16 +10,17 @@ use crate::math::rounding::f32_above;
 use crate::math::{Aabb, sum_abs, wide};
 use crate::scene::Scene;
 
-/// Packs all primitives in the order of their numbers, each once; returns the number of triangle blocks.
+/// Packs all primitives that count in the order of their numbers, each once; returns the number of triangle blocks.
 pub(crate) fn pack_in_order(scene: &Scene, census: &Census, parts: PartsMut) -> u32 {
     geometries(scene, parts.geometries);
     let mut packer =
         Packer::new(parts.triangle_blocks, parts.sphere_blocks, 0, census.triangle_count);
     let (triangle_ids, sphere_ids) = parts.prim_ids.split_at_mut(census.triangle_count as usize);
     let (mut triangle_ids, mut sphere_ids) = (triangle_ids.iter_mut(), sphere_ids.iter_mut());
-    for_each_prim(scene, |prim| {
-        let ids = if prim.shape.is_triangle() { &mut triangle_ids } else { &mut sphere_ids };
-        if let (Some(id), Some(_)) = (ids.next(), packer.push(&prim.shape)) {
+    for_each_named_in(scene, 0..u32::MAX, census.ignored_count == 0, |prim, names| {
+        let shape = if census.refit { names.of(prim.shape) } else { prim.shape };
+        let ids = if shape.is_triangle() { &mut triangle_ids } else { &mut sphere_ids };
+        if let (Some(id), Some(_)) = (ids.next(), packer.push(&shape)) {
             *id = prim.id;
         }
     });
@@ -28,7 +29,8 @@ pub(crate) fn pack_in_order(scene: &Scene, census: &Census, parts: PartsMut) -> 
 
 /// Primitives go in one by one and come to lie in blocks, in the order of their coming.
 ///
-/// Triangles of one block share vertices of equal bits. A block is closed when the next triangle
+/// Triangles of one block share vertices of equal bits; what is to be refitted brings [names](super::names::Names) as
+/// vertices. A block is closed when the next triangle
 /// would need a seventeenth vertex or lane, so every block but the last holds at least five.
 pub(crate) struct Packer<'b> {
     triangle_blocks: &'b mut [TriangleBlock],
@@ -135,6 +137,7 @@ impl<'b> Packer<'b> {
             block.set_corner(lane as usize, k, v);
         }
         block.aabb.add(&Aabb::around(&corners));
+        block.live |= 1 << lane;
         block.count += 1;
         fill.next_id += 1;
         Some((block_ref(KIND_TRIANGLES, number as u32), lane))
@@ -153,6 +156,7 @@ impl<'b> Packer<'b> {
         let block = self.sphere_blocks.get_mut(number)?;
         let lane = block.count as usize;
         (block.x[lane], block.y[lane], block.z[lane], block.radius[lane]) = (x, y, z, radius);
+        block.live |= 1 << lane;
         block.count += 1;
         fill.next_id += 1;
         Some((block_ref(KIND_SPHERES, number as u32), lane as u32))

@@ -5,7 +5,7 @@ use crate::block::Geometry;
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, TRIANGLES};
 
 /// Whether every lane in use has an id, triangles below `triangle_limit` and spheres from there to
-/// `prim_limit`, and whether the geometries number them all.
+/// `prim_limit`, whether only those can be hit, and whether the geometries number them all.
 pub(crate) fn leaves_are_sound(
     leaves: &Leaves,
     geometries: &[Geometry],
@@ -18,12 +18,15 @@ pub(crate) fn leaves_are_sound(
         leaves.prim_ids.get(first..first.checked_add(count)?)
     };
     let triangles = leaves.triangle_blocks.iter().all(|block| {
-        ids(block.first, block.count, TRIANGLES)
-            .is_some_and(|ids| ids.iter().all(|id| *id < triangle_limit))
+        let ids = ids(block.first, block.count, TRIANGLES);
+        let sound = ids.is_some_and(|ids| ids.iter().all(|id| *id < triangle_limit));
+        sound && block.lanes() & !block.held() == 0
     });
     let spheres = leaves.sphere_blocks.iter().all(|block| {
-        ids(block.first, block.count, SPHERES)
-            .is_some_and(|ids| ids.iter().all(|id| (triangle_limit..prim_limit).contains(id)))
+        let ids = ids(block.first, block.count, SPHERES);
+        let range = triangle_limit..prim_limit;
+        let sound = ids.is_some_and(|ids| ids.iter().all(|id| range.contains(id)));
+        sound && block.lanes() & !block.held() == 0
     });
     let starts = geometries.first().is_none_or(|g| g.first == 0);
     let ordered = geometries.is_sorted_by_key(|g| g.first);
@@ -35,8 +38,8 @@ impl Leaves<'_> {
     /// Whether the leaf names lanes in use of blocks that exist.
     pub fn has(&self, leaf: LeafRef) -> bool {
         let lanes_of = |number: usize| match leaf.kind() {
-            KIND_TRIANGLES => self.triangle_blocks.get(number).map_or(0, |block| block.lanes()),
-            KIND_SPHERES => self.sphere_blocks.get(number).map_or(0, |block| block.lanes()),
+            KIND_TRIANGLES => self.triangle_blocks.get(number).map_or(0, |block| block.held()),
+            KIND_SPHERES => self.sphere_blocks.get(number).map_or(0, |block| block.held()),
             _ => 0,
         };
         let lanes = lanes_of(leaf.number()) | lanes_of(leaf.number() + 1) << 16;

@@ -112,7 +112,7 @@ impl<'r, V: Lanes<16>> Aim<'r, V> {
             let areas = Areas::new::<true, 16>(&corners, self.largest_error);
             passed |= u32::from(lanes & !areas.outside(s) != 0) << i;
         }
-        passed
+        passed & opened.block.lanes()
     }
 
     #[inline(always)]

@@ -1,0 +1,60 @@
+//! Vertices by their numbers, where they will move: equal now need not be equal later.
+
+use super::gather::{GRAIN, Shape};
+use crate::caller::Caller;
+use crate::scene::{Mesh, Scene};
+
+impl Mesh<'_> {
+    /// What stands for the vertices of triangle `i` where they are compared by their bits: two are the same if they are
+    /// the same vertex. `first` is the flat number of the mesh's first triangle.
+    #[inline]
+    pub(crate) fn names(&self, first: u32, i: usize) -> Option<[[f32; 3]; 3]> {
+        let [mesh, zero] = [f32::from_bits(first), 0.0];
+        Some(self.numbers(i)?.map(|v| [f32::from_bits(v as u32), mesh, zero]))
+    }
+}
+
+/// Knows the vertices of a shape by name, if it is a triangle: its mesh, that one's first triangle and its own number.
+#[derive(Clone, Copy)]
+pub(crate) struct Names<'m, 'a>(pub Option<(&'m Mesh<'a>, u32, u32)>);
+
+impl Names<'_, '_> {
+    /// The shape with names in place of vertices.
+    #[inline]
+    pub fn of(self, shape: Shape) -> Shape {
+        let names = self.0.and_then(|(mesh, first, i)| mesh.names(first, i as usize));
+        names.map_or(shape, Shape::Triangle)
+    }
+}
+
+/// A digest of the vertex numbers of all triangles; `None` if one has no vertex. Any change of a number changes it, but
+/// for one in 2^64.
+pub(crate) fn digest(scene: &Scene, caller: &Caller) -> Option<u64> {
+    let mut sum = 0u64;
+    for (m, mesh) in (0u64..).zip((0..scene.mesh_count()).filter_map(|m| scene.mesh(m))) {
+        let count = mesh.triangle_count();
+        let mut parts = caller.map_parts(count, caller.part_size(count, GRAIN), |triangles| {
+            triangles.map(|i| triangle_digest(&mesh, m, i)).try_fold(0, add)
+        });
+        sum = parts.try_fold(sum, add)?;
+    }
+    Some(sum)
+}
+
+fn add(sum: u64, more: Option<u64>) -> Option<u64> {
+    Some(sum.wrapping_add(more?))
+}
+
+/// A few multiplications stir a triangle, its place and its mesh; the sum of all does not depend on their order.
+#[inline]
+fn triangle_digest(mesh: &Mesh, m: u64, i: usize) -> Option<u64> {
+    const ODD: u64 = 0x9E37_79B9_7F4A_7C15;
+    let numbers = mesh.numbers(i)?;
+    let stir = |state: u64, word: u64| {
+        let product = (state ^ word).wrapping_mul(ODD);
+        product ^ product >> 32
+    };
+    let last = numbers.into_iter().fold(0, usize::max);
+    let place = stir(m << 32 | i as u64, ODD);
+    (last < mesh.vertex_count()).then(|| numbers.into_iter().fold(place, |s, v| stir(s, v as u64)))
+}
