@@ -6,10 +6,11 @@ use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST};
 use crate::bvh;
 use crate::error::OpenError;
 use crate::grid;
+use crate::hits::{self, HitKey, Hits};
 use crate::prim::{self, Leaves};
 use crate::query::{
-    Choice, Counts, Decide, Exact, Meets, Precision, PrimId, QueryOptions, Watch, Watertight,
-    flat_number,
+    Choice, Counts, Decide, Exact, Meets, Precision, PrimId, QueryOptions, Wanted, Watch,
+    Watertight, flat_number,
 };
 use crate::ray::{Hit, Ray};
 use crate::surface::{self, Surface};
@@ -285,6 +286,38 @@ impl<'m> Accel<'m> {
         }
     }
 
+    /// All hits that `options` leaves, in the order of their real `t`; at equal `t` by geometry and
+    /// primitive. Each primitive comes at most once, whatever the structure, and a sphere twice, where
+    /// the ray enters and where it leaves: also when it only touches.
+    ///
+    /// Exact whatever precision `options` name, with the promises of [`intersect`](Self::intersect), of
+    /// which the answer is the first of these hits. At a shared edge or vertex every triangle that is
+    /// met comes. Nothing is allocated; a few hits at a time are looked for.
+    pub fn hits(&self, ray: &Ray, options: &QueryOptions) -> Hits<'m> {
+        Hits::new(self.0, *ray, self.choice(options))
+    }
+
+    /// The nearest of the [hits](Self::hits), as many as `hits` has room for, in one search that does not
+    /// look beyond the last of them; returns how many there are. What is behind them in `hits` is left as it was.
+    pub fn nearest_hits(&self, ray: &Ray, options: &QueryOptions, hits: &mut [Hit]) -> usize {
+        self.more_hits(ray, options, &mut None, hits)
+    }
+
+    /// The next of the [hits](Self::hits) after `last`, or the first ones, as many as `hits` has room for; returns how
+    /// many there are, and `last` becomes the last of them. Fewer than there was room for: there are no more.
+    ///
+    /// Nothing is lost or given twice between two calls for the same ray, however many hits round to
+    /// one `t`. A `last` that the ray does not meet: none.
+    pub fn more_hits(
+        &self,
+        ray: &Ray,
+        options: &QueryOptions,
+        last: &mut Option<HitKey>,
+        hits: &mut [Hit],
+    ) -> usize {
+        hits::fill(self.0, ray, self.choice(options), last, hits)
+    }
+
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when
     /// the ray has no such hit.
     ///
@@ -301,7 +334,8 @@ impl<'m> Accel<'m> {
 
     /// The surface at the hit with this flat number and `t` in one precision.
     fn surface_of<D: Decide>(&self, ray: &Ray, number: u32, t: f32) -> Option<Surface> {
-        let found = trace::ask(self.0, ray, LocateHit::<D>::new(number, t))?;
+        let found =
+            trace::ask(self.0, ray, LocateHit::<D>::new(Wanted { prim: number, t, root: None }))?;
         let line = ray.line();
         let (block, lane) = (found.place().block as usize, found.place().lane as usize);
         let Block { header, triangle_blocks, sphere_blocks, .. } = self.0.parts();

@@ -64,6 +64,7 @@ mod choice;
 mod error;
 mod exact;
 mod grid;
+mod hits;
 mod interval;
 mod list;
 mod math;
@@ -87,6 +88,7 @@ pub use build::{
 pub use caller::Threads;
 pub use error::{BuildError, OpenError, Unsupported};
 pub use grid::{GridKind, GridOptions};
+pub use hits::{HitKey, Hits};
 #[cfg(feature = "alloc")]
 pub use owned::OwnedAccel;
 #[cfg(feature = "parallel")]

@@ -19,7 +19,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("interval", &["exact", "math"]),
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
-    ("query", &["block", "exact", "interval", "ray", "sieve", "simd"]),
+    ("query", &["block", "exact", "interval", "math", "ray", "sieve", "simd"]),
     (
         "prim",
         &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
@@ -34,9 +34,13 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("surface", &["exact", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
+    ("hits", &["block", "query", "ray", "trace"]),
     (
         "accel",
-        &["batch", "block", "bvh", "error", "grid", "prim", "query", "ray", "surface", "trace"],
+        &[
+            "batch", "block", "bvh", "error", "grid", "hits", "prim", "query", "ray", "surface",
+            "trace",
+        ],
     ),
     (
         "build",

@@ -2,15 +2,17 @@
 //!
 //! A traversal offers lanes of leaf blocks that the [`sieve`](crate::sieve) could not reject. How
 //! a lane is decided is a [`Decide`]: [`Exact`] or [`Watertight`]. What is made of those that are met
-//! is a [`Query`]: [`Closest`], [`Any`] or [`Locate`]. Each question goes with each precision.
+//! is a [`Query`]: [`Closest`], [`Any`] or [`Locate`], which go with each precision, or [`NextHits`], which is exact.
 
 mod ask;
 mod exact;
+mod hits;
 mod options;
 mod watertight;
 
-pub(crate) use ask::{Any, Closest, Locate};
-pub(crate) use exact::Exact;
+pub(crate) use ask::{Any, Closest, Locate, Wanted};
+pub(crate) use exact::{Exact, ExactMet};
+pub(crate) use hits::NextHits;
 pub(crate) use options::{Choice, Filter, flat_number, geometry_of};
 pub use options::{Facing, Precision, PrimId, QueryOptions};
 pub(crate) use watertight::Watertight;
