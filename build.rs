@@ -15,7 +15,8 @@ mod header {
     use std::path::Path;
 
     /// In the order in which the header shall show them.
-    const SOURCES: [&str; 6] = ["status", "types", "version", "build", "query", "batch"];
+    const SOURCES: [&str; 8] =
+        ["status", "types", "version", "build", "query", "hits", "closest", "batch"];
     const HEADER: &str = "include/raykern.h";
 
     pub fn write() {

@@ -4,6 +4,7 @@ use crate::batch;
 use crate::block::cells::resolution;
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST};
 use crate::bvh;
+use crate::closest::{self, PointHit};
 use crate::error::OpenError;
 use crate::grid;
 use crate::hits::{self, HitKey, Hits};
@@ -316,6 +317,24 @@ impl<'m> Accel<'m> {
         hits: &mut [Hit],
     ) -> usize {
         hits::fill(self.0, ray, self.choice(options), last, hits)
+    }
+
+    /// The point closest to `point` on the triangles and the surfaces of spheres, of those that the mask and
+    /// `skip` of `options` leave; `None` when there is none within `radius`, ends included.
+    ///
+    /// Distances are computed in `f64` by one order of operations, whatever the structure, and of equal ones the first by
+    /// geometry and primitive wins: list, grid and BVH give the same bits. They are within 2^-46 of the
+    /// distance plus the primitive's longest edge or diameter; so nothing is closer by more than that. `distance` is rounded from
+    /// it. `facing` and `precision` are not asked, and `skip` leaves out all of a sphere.
+    ///
+    /// Finds nothing within a radius that is negative or NaN, from a point that is not finite, or beyond the largest float.
+    pub fn closest_point(
+        &self,
+        point: [f32; 3],
+        radius: f32,
+        options: &QueryOptions,
+    ) -> Option<PointHit> {
+        closest::closest_point(self.0, point, radius, self.choice(options))
     }
 
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when

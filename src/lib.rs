@@ -61,6 +61,7 @@ mod caller;
 #[allow(unsafe_code, reason = "C passes pointers, and calls by name")]
 mod capi;
 mod choice;
+mod closest;
 mod error;
 mod exact;
 mod grid;
@@ -70,6 +71,7 @@ mod list;
 mod math;
 #[cfg(feature = "alloc")]
 mod owned;
+mod point;
 mod prim;
 mod query;
 mod ray;
@@ -86,6 +88,7 @@ pub use build::{
     needs,
 };
 pub use caller::Threads;
+pub use closest::PointHit;
 pub use error::{BuildError, OpenError, Unsupported};
 pub use grid::{GridKind, GridOptions};
 pub use hits::{HitKey, Hits};

@@ -24,22 +24,30 @@ const HOUSE: &[(&str, &[&str])] = &[
         "prim",
         &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
     ),
+    ("point", &["block", "math", "prim", "query"]),
     ("choice", &["block", "math", "prim", "scene"]),
     ("list", &["block", "error", "prim", "scene"]),
-    ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"]),
+    (
+        "grid",
+        &["block", "error", "math", "point", "prim", "query", "ray", "scene", "simd", "storage"],
+    ),
     (
         "bvh",
-        &["block", "caller", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"],
+        &[
+            "block", "caller", "error", "math", "point", "prim", "query", "ray", "scene", "simd",
+            "storage",
+        ],
     ),
     ("surface", &["exact", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
     ("hits", &["block", "query", "ray", "trace"]),
+    ("closest", &["block", "bvh", "grid", "math", "point", "prim", "query", "ray"]),
     (
         "accel",
         &[
-            "batch", "block", "bvh", "error", "grid", "hits", "prim", "query", "ray", "surface",
-            "trace",
+            "batch", "block", "bvh", "closest", "error", "grid", "hits", "prim", "query", "ray",
+            "surface", "trace",
         ],
     ),
     (
@@ -49,12 +57,12 @@ const HOUSE: &[(&str, &[&str])] = &[
             "storage",
         ],
     ),
-    ("owned", &["accel", "build", "caller", "error", "scene", "storage"]),
+    ("owned", &["accel", "build", "caller", "closest", "error", "scene", "storage"]),
     (
         "capi",
         &[
-            "accel", "build", "caller", "error", "grid", "query", "ray", "scene", "storage",
-            "surface",
+            "accel", "build", "caller", "closest", "error", "grid", "hits", "query", "ray",
+            "scene", "storage", "surface",
         ],
     ),
 ];

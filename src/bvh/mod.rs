@@ -14,6 +14,7 @@ mod fits;
 mod order;
 mod refs;
 mod reinsert;
+mod search;
 mod spatial;
 mod split;
 mod stack;
@@ -28,6 +29,7 @@ use crate::caller::Caller;
 
 pub(crate) use bins::Effort;
 pub(crate) use compact::{build, needs};
+pub(crate) use search::{search, search_wide};
 pub(crate) use stack::Columns;
 pub(crate) use traverse::traverse;
 pub(crate) use validate::{bundles_are_sound, tree_is_sound};

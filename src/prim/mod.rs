@@ -183,7 +183,7 @@ impl Leaves<'_> {
         Lanes(lanes).any(|lane| {
             let (centre, radius) = block.sphere(lane);
             sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
-                let place = place(number as u32, block.first, lane as u32);
+                let place = Place::of_lane(number as u32, block.first, lane as u32);
                 query.sphere(ray, &SphereLane { centre, radius, place, detail })
             })
         })
@@ -252,14 +252,8 @@ fn consider<Q: Query>(
     ray: &PreparedRay,
     query: &mut Q,
 ) -> bool {
-    let place = place(number, block.first, lane);
+    let place = Place::of_lane(number, block.first, lane);
     query.triangle(ray, &TriangleLane { block, place, sure, inside })
-}
-
-/// The place of a lane of the block with this number and first entry.
-#[inline(always)]
-fn place(block: u32, first: u32, lane: u32) -> Place {
-    Place { block, lane, entry: first.wrapping_add(lane) }
 }
 
 /// Whether the ray comes near a block, in `f64`.
@@ -269,7 +263,7 @@ fn is_near(ray: &PreparedRay, block: &TriangleBlock, t_bound: f32) -> bool {
 }
 
 /// The numbers of the bits that are set, from the lowest.
-struct Lanes(u32);
+pub(crate) struct Lanes(pub u32);
 
 impl Iterator for Lanes {
     type Item = usize;

@@ -12,6 +12,7 @@
 
 pub mod dyadic;
 mod judge;
+pub mod point;
 mod root;
 mod sieve;
 mod sphere;
