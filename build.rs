@@ -15,7 +15,8 @@ mod header {
     use std::path::Path;
 
     /// In the order in which the header shall show them.
-    const SOURCES: [&str; 7] = ["status", "types", "version", "build", "refit", "query", "batch"];
+    const SOURCES: [&str; 9] =
+        ["status", "types", "version", "build", "refit", "query", "hits", "closest", "batch"];
     const HEADER: &str = "include/raykern.h";
 
     pub fn write() {

@@ -311,6 +311,38 @@ typedef struct RtSurface {
     float back_origin[3];
 } RtSurface;
 
+// Where a list of hits stands. Zero in every field but the first: before the first hit.
+typedef struct RtCursor {
+    uint32_t struct_size;
+    // 1: after the hit that the rest names; 0: the rest is ignored.
+    uint32_t begun;
+    // 0 for triangles and where the ray enters a sphere, 1 where it leaves one.
+    uint32_t root;
+    // As in its `RtHit`, like the next three.
+    float t;
+    uint32_t prim;
+    uint32_t geometry;
+    uint32_t instance;
+} RtCursor;
+
+// The point of a scene closest to another. If there is none `distance` is +infinity, the rest 0 or RT_NONE.
+typedef struct RtPointHit {
+    // How far it is, rounded to nearest.
+    float distance;
+    // Where it is, rounded to nearest.
+    float point[3];
+    // The weight of the triangle's second vertex; 0 on spheres.
+    float u;
+    // The weight of the triangle's third vertex; 0 on spheres.
+    float v;
+    // The number of the triangle or sphere within its geometry.
+    uint32_t prim;
+    // The number of the mesh, or `mesh_count` plus the number of the sphere set.
+    uint32_t geometry;
+    // As in an `RtHit`.
+    uint32_t instance;
+} RtPointHit;
+
 // Done.
 #define RT_OK 0
 
@@ -484,6 +516,47 @@ RtStatus rt_hit_surface(const RtAccel *accel,
                         const RtHit *hit,
                         RtSurface *out);
 
+// All hits that `query` leaves, null leaves everything, in the order of their real `t`; at equal `t` by
+// geometry and primitive. Writes the first of them to `hits`, as many as `capacity`, and returns how
+// many: the nearest few.
+//
+// With a cursor, which begins as zeros but for its `struct_size`, each call goes on after the last
+// hit of the call before, and the cursor with it. Fewer hits than `capacity`: there are no more. Nothing is
+// lost or given twice between two calls for the same accel, ray and query, even where several hits
+// round to one `t`. `cursor` may be null: each call begins with the first hit.
+//
+// Each primitive is given at most once, but a sphere twice: where the ray enters and where it leaves,
+// also when it only touches. At a shared edge or vertex all triangles that are met are given. Exact
+// whatever `query->precision` is, and the first of all is that of `rt_intersect`. What is in `hits`
+// behind those returned may be written too.
+//
+// 0 when another pointer is null, when query or cursor are refused, as `rt_query_check` would, and
+// when the cursor names a hit that the ray does not have.
+size_t rt_all_hits(const RtAccel *accel,
+                   const RtRay *ray,
+                   const RtQuery *query,
+                   RtCursor *cursor,
+                   RtHit *hits,
+                   size_t capacity);
+
+// The point closest to `point`, three floats, on the triangles and the surfaces of spheres within
+// `radius`, ends included; of what the mask and `skip` of `query` leave, which may be null. `skip`
+// leaves out all of a sphere here; `facing` and `precision` are not asked.
+//
+// Returns whether there is one, and writes it, or none, to `*out`. When another pointer is null or the query is
+// refused: false, and nothing is written.
+//
+// Distances are computed in double precision, the same bits from every structure and on every machine,
+// and of equal ones the first by geometry and primitive wins. They are within 2^-46 of the distance plus the
+// primitive's longest edge or diameter: nothing is closer by more than that.
+//
+// Nothing is within a radius that is negative or NaN, from a point that is not finite, or beyond FLT_MAX.
+bool rt_closest_point(const RtAccel *accel,
+                      const float *point,
+                      float radius,
+                      const RtQuery *query,
+                      RtPointHit *out);
+
 // `rt_intersect` for `count` rays. When a pointer is null, nothing is written.
 void rt_intersect_batch(const RtAccel *accel,
                         const RtRay *rays,
@@ -545,6 +618,8 @@ RT_RAYKERN_ASSERT(size_of_options, sizeof(RtBuildOptions) == 3 * sizeof(void *) 
 RT_RAYKERN_ASSERT(options_grid_kind, offsetof(RtBuildOptions, grid_kind) == 3 * sizeof(void *) + 24);
 RT_RAYKERN_ASSERT(options_user, offsetof(RtBuildOptions, user) == 24);
 RT_RAYKERN_ASSERT(size_of_query, sizeof(RtQuery) == 32);
+RT_RAYKERN_ASSERT(size_of_cursor, sizeof(RtCursor) == 28);
+RT_RAYKERN_ASSERT(size_of_point_hit, sizeof(RtPointHit) == 36);
 RT_RAYKERN_ASSERT(size_of_memory, sizeof(RtMemory) == 3 * sizeof(size_t));
 RT_RAYKERN_ASSERT(size_of_surface, sizeof(RtSurface) == 56);
 RT_RAYKERN_ASSERT(surface_normal, offsetof(RtSurface, normal) == 20);

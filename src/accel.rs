@@ -5,13 +5,15 @@ use crate::block::cells::resolution;
 use crate::block::level::Level;
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST, Motion};
 use crate::bvh;
+use crate::closest::{self, PointHit};
 use crate::error::OpenError;
 use crate::grid;
+use crate::hits::{self, HitKey, Hits};
 use crate::levels;
 use crate::prim::{self, Leaves};
 use crate::query::{
-    Choice, Counts, Decide, Exact, Meets, Precision, PrimId, QueryOptions, Watch, Watertight,
-    flat_number,
+    Choice, Counts, Decide, Exact, Meets, Precision, PrimId, QueryOptions, Wanted, Watch,
+    Watertight, flat_number,
 };
 use crate::ray::{Hit, NONE, Ray};
 use crate::scene::Instance;
@@ -321,6 +323,56 @@ impl<'m> Accel<'m> {
         }
     }
 
+    /// All hits that `options` leaves, in the order of their real `t`; at equal `t` by geometry and
+    /// primitive. Each primitive comes at most once, whatever the structure, and a sphere twice, where
+    /// the ray enters and where it leaves: also when it only touches.
+    ///
+    /// Exact whatever precision `options` name, with the promises of [`intersect`](Self::intersect), of
+    /// which the answer is the first of these hits. At a shared edge or vertex every triangle that is
+    /// met comes. Nothing is allocated; a few hits at a time are looked for.
+    pub fn hits(&self, ray: &Ray, options: &QueryOptions) -> Hits<'m> {
+        Hits::new(self.0, *ray, self.choice(options))
+    }
+
+    /// The nearest of the [hits](Self::hits), as many as `hits` has room for, in one search that does not
+    /// look beyond the last of them; returns how many there are. What is behind them in `hits` is left as it was.
+    pub fn nearest_hits(&self, ray: &Ray, options: &QueryOptions, hits: &mut [Hit]) -> usize {
+        self.more_hits(ray, options, &mut None, hits)
+    }
+
+    /// The next of the [hits](Self::hits) after `last`, or the first ones, as many as `hits` has room for; returns how
+    /// many there are, and `last` becomes the last of them. Fewer than there was room for: there are no more.
+    ///
+    /// Nothing is lost or given twice between two calls for the same ray, however many hits round to
+    /// one `t`. A `last` that the ray does not meet: none.
+    pub fn more_hits(
+        &self,
+        ray: &Ray,
+        options: &QueryOptions,
+        last: &mut Option<HitKey>,
+        hits: &mut [Hit],
+    ) -> usize {
+        hits::fill(self.0, ray, self.choice(options), last, hits)
+    }
+
+    /// The point closest to `point` on the triangles and the surfaces of spheres, of those that the mask and
+    /// `skip` of `options` leave; `None` when there is none within `radius`, ends included.
+    ///
+    /// Distances are computed in `f64` by one order of operations, whatever the structure, and of equal ones the first by
+    /// geometry and primitive wins: list, grid and BVH give the same bits. They are within 2^-46 of the
+    /// distance plus the primitive's longest edge or diameter; so nothing is closer by more than that. `distance` is rounded from
+    /// it. `facing` and `precision` are not asked, and `skip` leaves out all of a sphere.
+    ///
+    /// Finds nothing within a radius that is negative or NaN, from a point that is not finite, or beyond the largest float.
+    pub fn closest_point(
+        &self,
+        point: [f32; 3],
+        radius: f32,
+        options: &QueryOptions,
+    ) -> Option<PointHit> {
+        closest::closest_point(self.0, point, radius, self.choice(options))
+    }
+
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when
     /// the ray has no such hit.
     ///
@@ -435,7 +487,8 @@ fn spot_of(block: Finished, ray: &Ray, hit: &Hit) -> Option<Spot> {
 
 /// The point of the hit with this flat number and `t` in one precision.
 fn spot_in<D: Decide>(whole: Finished, ray: &Ray, number: u32, t: f32) -> Option<Spot> {
-    let found = trace::ask(whole, ray, LocateHit::<D>::new(number, t))?;
+    let found =
+        trace::ask(whole, ray, LocateHit::<D>::new(Wanted { prim: number, t, root: None }))?;
     let line = ray.line();
     let (block, lane) = (found.place().block as usize, found.place().lane as usize);
     let Block { header, triangle_blocks, sphere_blocks, .. } = whole.parts();

@@ -64,9 +64,11 @@ mod caller;
 #[allow(unsafe_code, reason = "C passes pointers, and calls by name")]
 mod capi;
 mod choice;
+mod closest;
 mod error;
 mod exact;
 mod grid;
+mod hits;
 mod instance;
 mod interval;
 mod levels;
@@ -75,6 +77,7 @@ mod math;
 #[cfg(feature = "alloc")]
 mod owned;
 mod pack;
+mod point;
 mod prim;
 mod query;
 mod ray;
@@ -93,8 +96,10 @@ pub use build::{
     needs,
 };
 pub use caller::Threads;
+pub use closest::PointHit;
 pub use error::{BuildError, OpenError, RefitError};
 pub use grid::{GridKind, GridOptions};
+pub use hits::{HitKey, Hits};
 #[cfg(feature = "alloc")]
 pub use owned::OwnedAccel;
 #[cfg(feature = "parallel")]

@@ -8,7 +8,8 @@ use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::prim::Leaves;
 use crate::query::{
-    Any, Choice, Closest, Decide, Exact, ExactMet, Filter, Locate, Meets, Query, Watch, geometry_of,
+    Any, Choice, Closest, Decide, Exact, ExactMet, Filter, Locate, Meets, Query, Wanted, Watch,
+    geometry_of,
 };
 use crate::ray::{Hit, Interval, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
@@ -164,18 +165,16 @@ impl<'m> Together<'m> for AnyHit<Exact, ()> {
     }
 }
 
-/// The meeting with the primitive of a number at an answered `t`.
+/// A known meeting.
 #[derive(Clone, Copy)]
 pub(crate) struct LocateHit<D> {
-    number: u32,
-    t: f32,
+    wanted: Wanted,
     decide: PhantomData<D>,
 }
 
 impl<D> LocateHit<D> {
-    /// With this flat number and `t`.
-    pub fn new(number: u32, t: f32) -> Self {
-        LocateHit { number, t, decide: PhantomData }
+    pub fn new(wanted: Wanted) -> Self {
+        LocateHit { wanted, decide: PhantomData }
     }
 }
 
@@ -187,7 +186,7 @@ impl<'m, D: Decide> Question<'m> for LocateHit<D> {
 
     #[inline(always)]
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        Locate::new(self.number, self.t, t_max, block.prim_ids)
+        Locate::new(self.wanted, t_max, block.prim_ids)
     }
 
     #[inline(always)]
@@ -278,8 +277,9 @@ fn hit<D: Decide>(
     record(&block.parts(), best.place(), D::t(ray, best, watch), D::weights(best))
 }
 
+/// The record of a meeting.
 #[inline(always)]
-fn record(block: &Block, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
+pub(crate) fn record(block: &Block, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
     let number = place.prim(block.prim_ids);
     let (geometry, first) =
         geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));

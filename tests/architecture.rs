@@ -20,27 +20,36 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("interval", &["exact", "math"]),
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
-    ("query", &["block", "exact", "interval", "ray", "sieve", "simd"]),
+    ("query", &["block", "exact", "interval", "math", "ray", "sieve", "simd"]),
     (
         "prim",
         &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
     ),
+    ("point", &["block", "math", "prim", "query"]),
     ("choice", &["block", "math", "prim", "scene"]),
     ("list", &["block", "error", "prim", "scene"]),
-    ("grid", &["block", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"]),
+    (
+        "grid",
+        &["block", "error", "math", "point", "prim", "query", "ray", "scene", "simd", "storage"],
+    ),
     (
         "bvh",
-        &["block", "caller", "error", "math", "prim", "query", "ray", "scene", "simd", "storage"],
+        &[
+            "block", "caller", "error", "math", "point", "prim", "query", "ray", "scene", "simd",
+            "storage",
+        ],
     ),
     ("surface", &["exact", "instance", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
     ("levels", &["block", "instance", "math", "prim", "query", "ray", "simd", "trace"]),
+    ("hits", &["block", "query", "ray", "trace"]),
+    ("closest", &["block", "bvh", "grid", "math", "point", "prim", "query", "ray"]),
     (
         "accel",
         &[
-            "batch", "block", "bvh", "error", "grid", "instance", "levels", "prim", "query", "ray",
-            "scene", "storage", "surface", "trace",
+            "batch", "block", "bvh", "closest", "error", "grid", "hits", "instance", "levels",
+            "prim", "query", "ray", "scene", "storage", "surface", "trace",
         ],
     ),
     ("refit", &["block", "bvh", "caller", "error", "math", "prim", "scene", "storage"]),
@@ -57,8 +66,8 @@ const HOUSE: &[(&str, &[&str])] = &[
     (
         "capi",
         &[
-            "accel", "build", "caller", "error", "grid", "query", "ray", "refit", "scene",
-            "storage", "surface",
+            "accel", "build", "caller", "closest", "error", "grid", "hits", "query", "ray",
+            "refit", "scene", "storage", "surface",
         ],
     ),
 ];

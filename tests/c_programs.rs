@@ -105,6 +105,11 @@ fn refit() {
 }
 
 #[test]
+fn hits() {
+    program("hits", "c_tests/hits.c", false, &["-std=c11"]);
+}
+
+#[test]
 fn control() {
     program("control", "c_tests/control.c", false, &["-std=c11", "-frounding-math"]);
 }

@@ -4,10 +4,10 @@
 
 mod common;
 
-use common::{All, agreed, odd_models};
+use common::{All, agreed, odd_models, ray_towards, strewn};
 use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Ray, Scene, SphereSet};
 use raykern_harness::make::{self, Random};
-use raykern_harness::model::{Model, TriangleMesh};
+use raykern_harness::model::Model;
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
 use raykern_harness::rays::{Family, RayMaker};
 
@@ -106,29 +106,11 @@ fn judge_all(rounds: usize, number: impl Fn(&mut Random, usize) -> f32) -> [u64;
     let mut random = Random::new(SEED);
     let [mut rays, mut ties, mut wrong] = [0; 3];
     for round in 0..rounds {
-        let point = |r: &mut Random| [0, 1, 2].map(|_| number(r, round));
-        let triangles = 1 + random.below(30);
-        let vertices: Vec<_> = (0..3 * triangles).map(|_| point(&mut random)).collect();
-        let indices = (0..triangles as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        let spheres: Vec<_> = (0..random.below(12))
-            .map(|_| (point(&mut random), point(&mut random)))
-            .map(|([x, y, z], [r, ..])| [x, y, z, r.abs()])
-            .collect();
-        let mesh = TriangleMesh { vertices: vertices.clone(), indices };
-        let model = Model { meshes: vec![mesh], sphere_sets: vec![spheres] };
+        let number = |r: &mut Random| number(r, round);
+        let model = strewn(&mut random, &number);
         let (all, oracle) = (All::of(&model), Oracle::new(&model));
         for _ in 0..200 {
-            let origin = point(&mut random);
-            let to = vertices[random.below(vertices.len())];
-            let direction = match random.below(3) {
-                0 => point(&mut random),
-                1 => [0, 1, 2].map(|k| to[k] - origin[k]),
-                _ => [0, 1, 2].map(|k| to[k] / 2.0 - origin[k] / 2.0),
-            };
-            let mut ray = Ray::new(origin, direction);
-            if random.below(2) == 0 {
-                ray = ray.with_limits(number(&mut random, round), number(&mut random, round));
-            }
+            let ray = ray_towards(&mut random, &model.meshes[0].vertices, &number);
             // Half of the rays leave out a sphere, if it exists.
             let (prim, geometry) = (random.below(12) as u32, random.below(2) as u32);
             let skip = (geometry == 1).then_some(PrimId { prim, geometry, instance: NONE });

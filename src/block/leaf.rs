@@ -206,6 +206,12 @@ pub(crate) struct Place {
 }
 
 impl Place {
+    /// The place of a lane of the block with this number and first entry.
+    #[inline(always)]
+    pub fn of_lane(block: u32, first: u32, lane: u32) -> Self {
+        Place { block, lane, entry: first.wrapping_add(lane) }
+    }
+
     /// The flat number of the primitive. Blocks are checked before they are traversed, so the entry exists.
     #[inline(always)]
     pub fn prim(self, prim_ids: &[u32]) -> u32 {

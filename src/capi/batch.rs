@@ -166,7 +166,7 @@ unsafe impl SameAs<u8> for bool {}
 /// # Safety
 ///
 /// They are valid, and nobody else uses them during `'o`.
-unsafe fn filled<'o, A: Copy>(at: *mut A, size: usize, value: A) -> &'o mut [A] {
+pub(super) unsafe fn filled<'o, A: Copy>(at: *mut A, size: usize, value: A) -> &'o mut [A] {
     for i in 0..size {
         // SAFETY: the caller's promise.
         unsafe { at.wrapping_add(i).write(value) };

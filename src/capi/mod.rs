@@ -5,7 +5,9 @@
 
 mod batch;
 mod build;
+mod closest;
 mod control;
+mod hits;
 mod lender;
 mod query;
 mod refit;

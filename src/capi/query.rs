@@ -152,7 +152,7 @@ pub unsafe extern "C" fn rt_hit_surface(
 ///
 /// `ray` is null or valid, and nobody writes to it during `'r`.
 #[inline(always)]
-unsafe fn ray_at<'r>(ray: *const RtRay) -> Result<&'r Ray, Error> {
+pub(super) unsafe fn ray_at<'r>(ray: *const RtRay) -> Result<&'r Ray, Error> {
     let ray = pointer(ray)?;
     // SAFETY: not null, aligned, valid as the caller promises, and of the same layout.
     Ok(unsafe { ray.cast().as_ref() })

@@ -237,6 +237,42 @@ pub struct RtQuery {
     pub skip_instance: u32,
 }
 
+/// Where a list of hits stands. Zero in every field but the first: before the first hit.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct RtCursor {
+    pub struct_size: u32,
+    /// 1: after the hit that the rest names; 0: the rest is ignored.
+    pub begun: u32,
+    /// 0 for triangles and where the ray enters a sphere, 1 where it leaves one.
+    pub root: u32,
+    /// As in its `RtHit`, like the next three.
+    pub t: f32,
+    pub prim: u32,
+    pub geometry: u32,
+    pub instance: u32,
+}
+
+/// The point of a scene closest to another. If there is none `distance` is +infinity, the rest 0 or RT_NONE.
+#[derive(Clone, Copy)]
+#[repr(C)]
+pub struct RtPointHit {
+    /// How far it is, rounded to nearest.
+    pub distance: f32,
+    /// Where it is, rounded to nearest.
+    pub point: [f32; 3],
+    /// The weight of the triangle's second vertex; 0 on spheres.
+    pub u: f32,
+    /// The weight of the triangle's third vertex; 0 on spheres.
+    pub v: f32,
+    /// The number of the triangle or sphere within its geometry.
+    pub prim: u32,
+    /// The number of the mesh, or `mesh_count` plus the number of the sphere set.
+    pub geometry: u32,
+    /// As in an `RtHit`.
+    pub instance: u32,
+}
+
 /// How much memory a build wants, in bytes.
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -321,6 +357,7 @@ const _: () = {
     assert!(size_of::<RtInstance>() == P + 56 && size_of::<RtScene>() == 3 * P + 32);
     assert!(size_of::<RtBuildOptions>() == 3 * P + 40 && size_of::<RtQuery>() == 32);
     assert!(size_of::<RtMemory>() == 3 * P && size_of::<RtSurface>() == 56);
+    assert!(size_of::<RtCursor>() == 28 && size_of::<RtPointHit>() == 36);
     assert!(size_of::<RtInfo>() == 4 * P + 72);
     assert!(core::mem::offset_of!(RtScene, meshes) == 32);
     assert!(core::mem::offset_of!(RtBuildOptions, user) == 24);
@@ -345,6 +382,8 @@ unsafe impl Growing for RtBuildOptions {
 // SAFETY: as above.
 unsafe impl Growing for RtQuery {}
 // SAFETY: as above.
+unsafe impl Growing for RtCursor {}
+// SAFETY: as above.
 unsafe impl Growing for RtSurface {}
 // SAFETY: as above.
 unsafe impl Growing for RtInfo {
@@ -358,6 +397,8 @@ unsafe impl Versioned for RtScene {}
 unsafe impl Versioned for RtBuildOptions {}
 // SAFETY: it begins with `struct_size`.
 unsafe impl Versioned for RtQuery {}
+// SAFETY: it begins with `struct_size`.
+unsafe impl Versioned for RtCursor {}
 // SAFETY: it begins with `struct_size`.
 unsafe impl Versioned for RtSurface {}
 // SAFETY: it begins with `struct_size`.

@@ -9,6 +9,7 @@ mod nested;
 mod options;
 mod overlap;
 mod ray;
+mod search;
 mod space;
 mod steps;
 mod uniform;
@@ -16,6 +17,7 @@ mod validate;
 mod walk;
 
 pub use options::{GridKind, GridOptions};
+pub(crate) use search::search;
 pub(crate) use validate::grids_are_sound;
 pub(crate) use walk::{Cells, walk};
 

@@ -186,12 +186,12 @@ impl Leaves<'_> {
         query.watch().block(lanes.count_ones());
         Lanes(lanes).any(|lane| {
             if Q::OF_INDEX {
-                let place = place(number as u32, block.first, lane as u32);
+                let place = Place::of_lane(number as u32, block.first, lane as u32);
                 return query.instance(place.prim(self.prim_ids));
             }
             let (centre, radius) = block.sphere(lane);
             sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
-                let place = place(number as u32, block.first, lane as u32);
+                let place = Place::of_lane(number as u32, block.first, lane as u32);
                 query.sphere(ray, &SphereLane { centre, radius, place, detail })
             })
         })
@@ -260,14 +260,8 @@ fn consider<Q: Query>(
     ray: &PreparedRay,
     query: &mut Q,
 ) -> bool {
-    let place = place(number, block.first, lane);
+    let place = Place::of_lane(number, block.first, lane);
     query.triangle(ray, &TriangleLane { block, place, sure, inside })
-}
-
-/// The place of a lane of the block with this number and first entry.
-#[inline(always)]
-fn place(block: u32, first: u32, lane: u32) -> Place {
-    Place { block, lane, entry: first.wrapping_add(lane) }
 }
 
 /// Whether the ray comes near a block, in `f64`.
@@ -277,7 +271,7 @@ fn is_near(ray: &PreparedRay, block: &TriangleBlock, t_bound: f32) -> bool {
 }
 
 /// The numbers of the bits that are set, from the lowest.
-struct Lanes(u32);
+pub(crate) struct Lanes(pub u32);
 
 impl Iterator for Lanes {
     type Item = usize;

@@ -145,23 +145,34 @@ impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
 
 /// Finds the hit with this primitive and this answered `t` again.
 pub(crate) struct Locate<'m, D: Decide> {
-    prim: u32,
+    wanted: Wanted,
     prim_ids: &'m [u32],
-    t: f32,
     t_max: f32,
     pub found: Option<D::Met>,
     watch: (),
 }
 
+/// A hit by the flat number of its primitive, its `t` and, if both of a sphere have that, its root.
+#[derive(Clone, Copy)]
+pub(crate) struct Wanted {
+    pub prim: u32,
+    pub t: f32,
+    /// Either one when this is `None`.
+    pub root: Option<usize>,
+}
+
 impl<'m, D: Decide> Locate<'m, D> {
     #[inline(always)]
-    pub fn new(prim: u32, t: f32, t_max: f32, prim_ids: &'m [u32]) -> Self {
-        Locate { prim, prim_ids, t, t_max, found: None, watch: () }
+    pub fn new(wanted: Wanted, t_max: f32, prim_ids: &'m [u32]) -> Self {
+        Locate { wanted, prim_ids, t_max, found: None, watch: () }
     }
 
     #[inline(always)]
     fn consider(&mut self, ray: &PreparedRay, met: Option<D::Met>) -> bool {
-        self.found = met.filter(|met| D::t(ray, met, &mut ()) == self.t);
+        let Wanted { t, root, .. } = self.wanted;
+        self.found = met.filter(|met| {
+            root.is_none_or(|root| root == met.root()) && D::t(ray, met, &mut ()) == t
+        });
         self.found.is_some()
     }
 }
@@ -178,14 +189,14 @@ impl<D: Decide> Query for Locate<'_, D> {
 
     #[inline(always)]
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
-        lane.place.prim(self.prim_ids) == self.prim && {
+        lane.place.prim(self.prim_ids) == self.wanted.prim && {
             let met = D::triangle(ray, lane, &mut ());
             self.consider(ray, met)
         }
     }
 
     fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
-        lane.place.prim(self.prim_ids) == self.prim
+        lane.place.prim(self.prim_ids) == self.wanted.prim
             && D::sphere(ray, lane, &mut ()).into_iter().any(|met| self.consider(ray, met))
     }
 

@@ -173,6 +173,35 @@ impl Exact {
         let t = surely_rounded(interval(meeting.t, meeting.t_error), meeting.t)?;
         Some((t, clamped_weights(meeting.weights.map(|weight| weight as f32))))
     }
+
+    /// The meetings with a sphere stored at `place` that lie within the limits, entering and leaving.
+    #[inline(never)]
+    pub fn roots(
+        ray: &PreparedRay,
+        (centre, radius): ([f32; 3], f32),
+        place: Place,
+        watch: &mut impl Watch,
+    ) -> [Option<ExactMet>; 2] {
+        watch.interval();
+        let Some(both) = sphere::meet(&ray.line(), centre, radius) else { return [None; 2] };
+        if both.exact {
+            watch.exact();
+        }
+        [0, 1].map(|root| {
+            let met = ExactMet {
+                t: both.t[root],
+                t_error: both.t_error[root],
+                weights: [0.0; 2],
+                meeting: Meeting::Sphere { centre, radius, root },
+                feature: Feature::Face,
+                place,
+                front: root == 0,
+                // A line that only touches meets front and back in one point.
+                skippable: both.touches || root == both.nearest,
+            };
+            met.limited(ray, watch)
+        })
+    }
 }
 
 impl Decide for Exact {
@@ -214,32 +243,12 @@ impl Decide for Exact {
         met.limited(ray, watch)
     }
 
-    #[inline(never)]
     fn sphere(
         ray: &PreparedRay,
         lane: &SphereLane,
         watch: &mut impl Watch,
     ) -> [Option<ExactMet>; 2] {
-        watch.interval();
-        let SphereLane { centre, radius, .. } = *lane;
-        let Some(both) = sphere::meet(&ray.line(), centre, radius) else { return [None; 2] };
-        if both.exact {
-            watch.exact();
-        }
-        [0, 1].map(|root| {
-            let met = ExactMet {
-                t: both.t[root],
-                t_error: both.t_error[root],
-                weights: [0.0; 2],
-                meeting: Meeting::Sphere { centre, radius, root },
-                feature: Feature::Face,
-                place: lane.place,
-                front: root == 0,
-                // A line that only touches meets front and back in one point.
-                skippable: both.touches || root == both.nearest,
-            };
-            met.limited(ray, watch)
-        })
+        Exact::roots(ray, (lane.centre, lane.radius), lane.place, watch)
     }
 
     #[inline(always)]

@@ -2,15 +2,17 @@
 //!
 //! A traversal offers lanes of leaf blocks that the [`sieve`](crate::sieve) could not reject. How
 //! a lane is decided is a [`Decide`]: [`Exact`] or [`Watertight`]. What is made of those that are met
-//! is a [`Query`]: [`Closest`], [`Any`] or [`Locate`]. Each question goes with each precision.
+//! is a [`Query`]: [`Closest`], [`Any`] or [`Locate`], which go with each precision, or [`NextHits`], which is exact.
 
 mod ask;
 mod exact;
+mod hits;
 mod options;
 mod watertight;
 
-pub(crate) use ask::{Any, Closest, Locate};
+pub(crate) use ask::{Any, Closest, Locate, Wanted};
 pub(crate) use exact::{Exact, ExactMet};
+pub(crate) use hits::NextHits;
 pub(crate) use options::shares_bit;
 pub(crate) use options::{Choice, Filter, flat_number, geometry_of};
 pub use options::{Facing, Precision, PrimId, QueryOptions};
@@ -225,7 +227,7 @@ pub(crate) trait Meets {
 
 /// The part of `[0, 1]` in which weights lie: neither they nor `1 - u - v` are negative; `v` gives way.
 #[expect(clippy::manual_clamp, reason = "`clamp` panics on the NaN that foreign blocks can give")]
-fn clamped_weights([u, v]: [f32; 2]) -> [f32; 2] {
+pub(crate) fn clamped_weights([u, v]: [f32; 2]) -> [f32; 2] {
     let u = u.max(0.0).min(1.0) + 0.0;
     let v = v.max(0.0).min(1.0 - u) + 0.0;
     [u, v]

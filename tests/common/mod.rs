@@ -6,7 +6,7 @@ use raykern::{
     Accel, Backend, BuildOptions, GridKind, GridOptions, Hit, Layout, OpenError, OwnedAccel,
     PlainList, Quality, QueryOptions, Ray, Scene,
 };
-use raykern_harness::make;
+use raykern_harness::make::{self, Random};
 use raykern_harness::model::{Model, TriangleMesh};
 
 /// List, grids of every kind, and BVH in every layout and quality over one scene, each forced.
@@ -90,6 +90,40 @@ pub fn agreed(accels: &[(&str, Accel)], ray: &Ray, options: &QueryOptions) -> Op
         assert_eq!(occluded, hit.is_some(), "{name} occluded {ray:?} {options:?}");
     }
     expected
+}
+
+/// Up to 30 triangles and 11 spheres of such numbers.
+pub fn strewn(random: &mut Random, number: &impl Fn(&mut Random) -> f32) -> Model {
+    let point = |r: &mut Random| [0, 1, 2].map(|_| number(r));
+    let triangles = 1 + random.below(30);
+    let vertices: Vec<_> = (0..3 * triangles).map(|_| point(random)).collect();
+    let indices = (0..triangles as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let spheres: Vec<_> = (0..random.below(12))
+        .map(|_| (point(random), point(random)))
+        .map(|([x, y, z], [r, ..])| [x, y, z, r.abs()])
+        .collect();
+    Model { meshes: vec![TriangleMesh { vertices, indices }], sphere_sets: vec![spheres] }
+}
+
+/// A ray of such numbers, mostly towards a vertex; half of them have limits.
+pub fn ray_towards(
+    random: &mut Random,
+    vertices: &[[f32; 3]],
+    number: &impl Fn(&mut Random) -> f32,
+) -> Ray {
+    let point = |r: &mut Random| [0, 1, 2].map(|_| number(r));
+    let origin = point(random);
+    let to = vertices[random.below(vertices.len())];
+    let direction = match random.below(3) {
+        0 => point(random),
+        1 => [0, 1, 2].map(|k| to[k] - origin[k]),
+        _ => [0, 1, 2].map(|k| to[k] / 2.0 - origin[k] / 2.0),
+    };
+    let ray = Ray::new(origin, direction);
+    match random.below(2) {
+        0 => ray.with_limits(number(random), number(random)),
+        _ => ray,
+    }
 }
 
 /// Models with flat, doubled and degenerate triangles, one primitive, and none.

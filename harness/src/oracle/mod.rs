@@ -12,6 +12,7 @@
 
 pub mod dyadic;
 mod judge;
+pub mod point;
 mod root;
 mod sieve;
 mod sphere;
@@ -70,9 +71,7 @@ impl Oracle {
 
     /// The closest hit among what `options` leaves.
     pub fn closest(&self, ray: &Ray, options: &QueryOptions) -> Verdict {
-        let mut hits = self.all_hits(ray, options);
-        hits.sort_by(|a, b| a.t.cmp(&b.t).then(a.place.cmp(&b.place)));
-        let mut hits = hits.into_iter();
+        let mut hits = self.all_hits(ray, options).into_iter();
         let hit = hits.next();
         let equal_t = match &hit {
             Some(first) => hits
@@ -85,8 +84,9 @@ impl Oracle {
         Verdict { hit, equal_t }
     }
 
-    /// Every hit within the ray's limits that `options` leaves, in no order.
-    fn all_hits(&self, ray: &Ray, options: &QueryOptions) -> Vec<ExactHit> {
+    /// Every hit within the ray's limits that `options` leaves, in order: by `t`, at equal `t` by place, and where a sphere
+    /// is only touched entering before leaving.
+    pub fn all_hits(&self, ray: &Ray, options: &QueryOptions) -> Vec<ExactHit> {
         let mut hits = Vec::new();
         if !hits_anything(ray) {
             return hits;
@@ -100,6 +100,7 @@ impl Oracle {
                 }));
             }
         });
+        hits.sort_by(|a, b| a.t.cmp(&b.t).then(a.place.cmp(&b.place)));
         hits
     }
 

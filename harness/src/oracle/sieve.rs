@@ -56,6 +56,11 @@ impl Sieve {
         Sieve { items, balls }
     }
 
+    /// Every finite primitive, in no order.
+    pub fn all(&self) -> &[(Place, Shape)] {
+        &self.items
+    }
+
     /// Calls `f` with every primitive that the whole line may meet, and with some others.
     pub fn each_near(
         &self,

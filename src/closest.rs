@@ -1,0 +1,78 @@
+//! The closest point of a scene, by the structure at hand.
+
+use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
+use crate::bvh;
+use crate::grid::{self, Cells};
+use crate::math::float::sqrt;
+use crate::point::Nearest;
+use crate::prim::Leaves;
+use crate::query::{Choice, Filter, clamped_weights, geometry_of};
+use crate::ray::NONE;
+
+/// The point of a scene that is closest to a given one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointHit {
+    /// How far it is, rounded to nearest.
+    pub distance: f32,
+    /// Where it is, rounded to nearest.
+    pub point: [f32; 3],
+    /// The weight of the triangle's second vertex there; 0 on spheres.
+    pub u: f32,
+    /// The weight of the triangle's third vertex there; 0 on spheres.
+    pub v: f32,
+    /// The number of the triangle or sphere within its geometry.
+    pub prim: u32,
+    /// The number of the mesh, or the number of meshes plus the number of the sphere set.
+    pub geometry: u32,
+    /// The number of the instance, [`NONE`] outside instances.
+    pub instance: u32,
+}
+
+/// The closest point within `radius` of `point` on what `choice` leaves.
+pub(crate) fn closest_point(
+    block: Finished,
+    point: [f32; 3],
+    radius: f32,
+    choice: Choice,
+) -> Option<PointHit> {
+    // A NaN is within no radius.
+    if !(radius >= 0.0) || !point.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    let block = &block.parts();
+    let filter = Filter::new(choice, block.geometries, block.prim_ids);
+    let radius = if radius > f32::MAX { f32::MAX } else { radius };
+    let mut nearest = Nearest::new(point, radius, block.header.reach, filter, Leaves::of(block));
+    search(block, &mut nearest);
+    let (number, foot) = nearest.best()?;
+    let (geometry, first) =
+        geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
+    let [u, v] = clamped_weights(foot.weights.map(|weight| weight as f32));
+    Some(PointHit {
+        distance: sqrt(foot.square) as f32,
+        // Adding +0 turns -0 into +0.
+        point: foot.point.to_array().map(|x| x as f32 + 0.0),
+        u,
+        v,
+        prim: number - first,
+        geometry,
+        instance: NONE,
+    })
+}
+
+fn search(block: &Block, nearest: &mut Nearest) {
+    match block.bundles {
+        Bundles::Sixteen(bundles) => bvh::search_wide(bundles, nearest),
+        Bundles::Eight(bundles) => bvh::search_wide(bundles, nearest),
+        Bundles::Four(bundles) => bvh::search_wide(bundles, nearest),
+        Bundles::None => match block.header.kind {
+            KIND_BVH => bvh::search(block.nodes, nearest),
+            KIND_GRID => {
+                let Block { grids, words, runs, .. } = *block;
+                let leaves = Leaves::of(block);
+                grid::search(&Cells { grids, words, runs, leaves }, nearest);
+            }
+            _ => nearest.all(),
+        },
+    }
+}

@@ -1,0 +1,163 @@
+//! The question of a point: what in the scene is closest to it.
+//!
+//! A structure offers [`Nearest`] the leaves whose boxes come within its [bound](Nearest::is_within), near ones
+//! first. All arithmetic is `f64` in one order of operations, whatever the structure, so the answer has the same bits
+//! from all of them; how far it can be from the real one, `docs/METHODS.md` derives.
+
+mod shape;
+#[cfg(test)]
+mod tests;
+
+use glam::DVec3;
+
+use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place};
+use crate::math::float::sqrt;
+use crate::math::{Aabb, wide};
+use crate::prim::{Lanes, Leaves};
+use crate::query::Filter;
+use shape::Foot;
+
+/// What is closest so far.
+pub(crate) struct Nearest<'m> {
+    point: DVec3,
+    filter: Filter<'m>,
+    leaves: Leaves<'m>,
+    /// What computed distances to primitives and boxes may be off, together.
+    slack: f64,
+    /// The square of the distance up to which everything counts.
+    limit: f64,
+    /// How far to look for now.
+    sight: f64,
+    /// The square of the distance beyond which no box is of interest.
+    bound: f64,
+    best: Option<(u32, Foot)>,
+}
+
+/// What distances may be off for each unit of the largest coordinates.
+///
+/// A computed distance is within 2^-46 of the distance and the longest edge, of which the sum is less than eight of these units;
+/// boxes and cells take a few roundings.
+const SLACK: f64 = 1.0 / (1u64 << 42) as f64;
+
+impl<'m> Nearest<'m> {
+    /// Nothing yet within `radius` of `point`. `reach` is the largest coordinate of the scene.
+    pub fn new(
+        point: [f32; 3],
+        radius: f32,
+        reach: f32,
+        filter: Filter<'m>,
+        leaves: Leaves<'m>,
+    ) -> Self {
+        let (point, radius) = (wide(point), f64::from(radius));
+        let slack = (point.abs().max_element() + f64::from(reach)) * SLACK;
+        let limit = radius * radius;
+        let sight = radius;
+        let mut nearest =
+            Nearest { point, filter, leaves, slack, limit, sight, bound: 0.0, best: None };
+        nearest.narrow();
+        nearest
+    }
+
+    /// Looks no farther than this for now.
+    pub fn look_up_to(&mut self, distance: f64) {
+        self.sight = distance;
+        self.narrow();
+    }
+
+    /// Sets the bound by how far to look, by the limit and by what is closest so far.
+    fn narrow(&mut self) {
+        let best = self.best.map_or(self.limit, |(_, foot)| foot.square);
+        let widened = self.sight.min(sqrt(best)) + self.slack;
+        self.bound = widened * widened;
+    }
+
+    /// Whether what is closest of all lies within this distance, or nothing does: then there is no need to look farther.
+    pub fn is_settled_within(&self, distance: f64) -> bool {
+        let far = self.best.map_or(self.limit, |(_, foot)| foot.square);
+        far <= distance * distance
+    }
+
+    pub fn point(&self) -> DVec3 {
+        self.point
+    }
+
+    /// The number of the closest primitive and the point on it.
+    pub fn best(&self) -> Option<(u32, Foot)> {
+        self.best
+    }
+
+    /// Whether something in a box at this distance, squared, may be the closest. True for a NaN.
+    #[inline(always)]
+    pub fn is_within(&self, square: f64) -> bool {
+        !(square > self.bound)
+    }
+
+    /// The square of the distance to a box; infinite to an empty one.
+    #[inline(always)]
+    pub fn square_to(&self, aabb: &Aabb) -> f64 {
+        let (below, above) = (wide(aabb.lower) - self.point, self.point - wide(aabb.upper));
+        let gap = |a: f64, b: f64| {
+            let gap = if a > b { a } else { b };
+            if gap > 0.0 { gap * gap } else { 0.0 }
+        };
+        gap(below.x, above.x) + gap(below.y, above.y) + gap(below.z, above.z)
+    }
+
+    /// Considers all primitives.
+    pub fn all(&mut self) {
+        for number in 0..self.leaves.triangle_blocks.len() {
+            self.block((KIND_TRIANGLES, number), u32::MAX);
+        }
+        for number in 0..self.leaves.sphere_blocks.len() {
+            self.block((KIND_SPHERES, number), u32::MAX);
+        }
+    }
+
+    /// Considers the lanes of a leaf.
+    pub fn leaf(&mut self, leaf: LeafRef) {
+        let (kind, number) = (leaf.kind(), leaf.number());
+        let (lanes, next) = (leaf.lanes & 0xFFFF, leaf.lanes >> 16);
+        self.block((kind, number), lanes);
+        if next != 0 {
+            self.block((kind, number + 1), next);
+        }
+    }
+
+    /// Considers those of `lanes` of a block that are in use.
+    pub fn block(&mut self, (kind, number): (u32, usize), lanes: u32) {
+        if kind == KIND_TRIANGLES {
+            let Some(block) = self.leaves.triangle_blocks.get(number) else { return };
+            if !self.is_within(self.square_to(&block.aabb)) {
+                return;
+            }
+            for lane in Lanes(lanes & block.lanes()) {
+                let corners = block.triangle(lane);
+                if self.is_within(self.square_to(&Aabb::around(&corners))) {
+                    let foot = shape::on_triangle(self.point, corners);
+                    self.consider(Place::of_lane(number as u32, block.first, lane as u32), foot);
+                }
+            }
+        } else if kind == KIND_SPHERES {
+            let Some(block) = self.leaves.sphere_blocks.get(number) else { return };
+            for lane in Lanes(lanes & block.lanes()) {
+                let (centre, radius) = block.sphere(lane);
+                let foot = shape::on_sphere(self.point, centre, radius);
+                self.consider(Place::of_lane(number as u32, block.first, lane as u32), foot);
+            }
+        }
+    }
+
+    /// Keeps the closest, of equally close ones the first. A NaN is none.
+    fn consider(&mut self, place: Place, foot: Foot) {
+        let least = self.best.map_or(self.limit, |(_, best)| best.square);
+        if !(foot.square <= least) || !self.filter.sees(place, true) {
+            return;
+        }
+        let number = place.prim(self.leaves.prim_ids);
+        let first = self.best.is_none_or(|(best, _)| number < best);
+        if foot.square < least || first {
+            self.best = Some((number, foot));
+            self.narrow();
+        }
+    }
+}

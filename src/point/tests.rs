@@ -1,0 +1,92 @@
+//! How much of its bound the computed distance uses up.
+
+use raykern_harness::make::Random;
+use raykern_harness::oracle::point::{longest_edge, to_sphere, to_triangle};
+
+use super::*;
+
+/// The bound on a distance, for each unit of the distance and the size of the primitive.
+const BOUND: f64 = 1.0 / (1u64 << 46) as f64;
+
+/// The error of a computed square as a part of the bound.
+fn used(foot: &Foot, distance: f64, size: f64) -> f64 {
+    (sqrt(foot.square) - distance).abs() / (BOUND * (distance + size))
+}
+
+/// A triangle whose third vertex is about `thin` of the first edge from that, and another edge may be
+/// as much shorter.
+fn thin(random: &mut Random, exponents: [f64; 2]) -> [[f32; 3]; 3] {
+    let mut shrink = || 2f64.powf(exponents[0] + (exponents[1] - exponents[0]) * random.unit());
+    let (thin, short) = (shrink(), shrink());
+    let [a, e, f] = [0; 3].map(|_| random.direction());
+    let along = if random.below(2) == 0 { short } else { random.unit() };
+    let b = [0, 1, 2].map(|k| a[k] + e[k]);
+    let c = [0, 1, 2].map(|k| a[k] + along * e[k] + thin * f[k]);
+    let turn = random.below(3);
+    let corners = [a, b, c].map(|p| p.map(|x| x as f32));
+    [0, 1, 2].map(|i| corners[(i + turn) % 3])
+}
+
+/// A point at about `far` from a point of the triangle or of the line through an edge.
+fn beside(random: &mut Random, corners: [[f32; 3]; 3], far: f64) -> [f32; 3] {
+    let [a, b, c] = corners.map(|p| p.map(f64::from));
+    let [v, w] = [random.between(-0.2, 1.2), random.between(-0.2, 1.2)];
+    let away = random.direction();
+    [0, 1, 2].map(|k| (a[k] + v * (b[k] - a[k]) + w * (c[k] - a[k]) + far * away[k]) as f32)
+}
+
+#[test]
+fn triangles_keep_their_bound() {
+    let mut random = Random::new(1);
+    let mut most = 0.0f64;
+    for round in 0..60_000 {
+        let exponents = [[-2.0, 0.0], [-24.0, 0.0], [-24.0, -20.0]][round % 3];
+        let corners = thin(&mut random, exponents);
+        let far = if random.below(5) == 0 { 0.0 } else { 2f64.powf(random.between(-40.0, 20.0)) };
+        let point = beside(&mut random, corners, far);
+        let Some(distance) = to_triangle(point, corners) else { continue };
+        let foot = shape::on_triangle(wide(point), corners);
+        let part = used(&foot, distance, longest_edge(corners));
+        assert!(part <= 1.0, "{part}: {point:?} {corners:?} {foot:?} {distance:e}");
+        most = most.max(part);
+    }
+    std::println!("triangles use {most:.3} of the bound");
+}
+
+#[test]
+fn spheres_keep_their_bound() {
+    let mut random = Random::new(2);
+    let mut most = 0.0f64;
+    for _ in 0..60_000 {
+        let [x, y, z] = random.direction().map(|x| x as f32);
+        let radius = 2f64.powf(random.between(-20.0, 10.0));
+        let far =
+            radius + radius * 2f64.powf(random.between(-30.0, 20.0)) * random.between(-1.0, 1.0);
+        let (centre, away) = ([x, y, z], random.direction());
+        let point = [0, 1, 2].map(|k| (f64::from(centre[k]) + far * away[k]) as f32);
+        let distance = to_sphere(point, [x, y, z, radius as f32]).expect("a radius");
+        let foot = shape::on_sphere(wide(point), centre, radius as f32);
+        let part = used(&foot, distance, 2.0 * radius);
+        assert!(part <= 1.0, "{part}: {point:?} {centre:?} {radius} {foot:?} {distance:e}");
+        most = most.max(part);
+    }
+    std::println!("spheres use {most:.3} of the bound");
+}
+
+#[test]
+fn known_feet() {
+    let corners = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    for (point, square, weights) in [
+        ([1.0, 1.0, -2.0], 4.0, [0.25, 0.25]),
+        ([2.0, -3.0, 4.0], 25.0, [0.5, 0.0]),
+        ([-3.0, 1.0, 0.0], 9.0, [0.0, 0.25]),
+        ([3.0, 3.0, 0.0], 2.0, [0.5, 0.5]),
+        ([7.0, 0.0, 4.0], 25.0, [1.0, 0.0]),
+        ([0.0, 8.0, 3.0], 25.0, [0.0, 1.0]),
+    ] {
+        let foot = shape::on_triangle(wide(point), corners);
+        assert_eq!((foot.square, foot.weights), (square, weights), "{point:?}");
+    }
+    let centre = shape::on_sphere(wide([1.0; 3]), [1.0; 3], 2.0);
+    assert_eq!((centre.square, centre.point), (4.0, DVec3::new(3.0, 1.0, 1.0)));
+}
