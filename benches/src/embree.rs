@@ -100,12 +100,7 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) {
     }
 }
 
-fn add_batches(
-    lineup: &mut Lineup,
-    name: &str,
-    [streams, packets]: [Class; 2],
-    scene: &Rc<Scene>,
-) {
+fn add_batches(lineup: &mut Lineup, name: &str, [streams, packets]: [Class; 2], scene: &Rc<Scene>) {
     for (form, class, width, coherent) in [
         ("x8", packets, 8, None),
         ("x16", packets, 16, None),
