@@ -8,6 +8,9 @@ set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
 
+# What every step with tests asks for: other features of any crate would compile the core once more, which takes minutes.
+all=(--workspace --features raykern/capi)
+
 step_install() {
     local missing=()
     command -v cc >/dev/null || missing+=(gcc libc6-dev)
@@ -48,15 +51,14 @@ step_build() {
 }
 
 step_test() {
-    cargo test --workspace --features raykern/capi
-    cargo test --example compare
+    cargo test "${all[@]}"
 }
 
 # The tests of answers once more with each lower backend; `test` has run them with the best one.
 step_backends() {
     local backend
     for backend in scalar bits128 avx2; do
-        RAYKERN_BACKEND=$backend cargo test -q --features capi \
+        RAYKERN_BACKEND=$backend cargo test -q "${all[@]}" \
             --test agree --test exact --test hostile --test laws --test watertight
     done
 }
@@ -78,7 +80,7 @@ step_header() {
 }
 
 # The C programs once more, with address and undefined-behaviour sanitizers.
-step_c() { RAYKERN_SANITIZE=1 cargo test --features capi --test c_programs; }
+step_c() { RAYKERN_SANITIZE=1 cargo test "${all[@]}" --test c_programs; }
 
 # Each fuzz target for ten seconds, from nothing; fuzz/README.md says how to run them for longer.
 step_fuzz() (

@@ -19,17 +19,17 @@ pub(crate) struct Effort {
     pub strip: usize,
     /// Above this unevenness of the refs more is done.
     even: f64,
-    /// Whether that is to cut refs in two, and to mend the grown tree.
-    pub mends: bool,
+    /// Whether refs may then be cut in two.
+    pub cuts: bool,
 }
 
 impl Effort {
     pub const FAST: Effort =
-        Effort { bins: 16, samples: 64, one_axis: true, strip: 4, even: 64.0, mends: false };
+        Effort { bins: 16, samples: 64, one_axis: true, strip: 4, even: 64.0, cuts: false };
     pub const BALANCED: Effort =
-        Effort { bins: 16, samples: 512, one_axis: false, strip: 2, even: 64.0, mends: false };
+        Effort { bins: 16, samples: 512, one_axis: false, strip: 2, even: 64.0, cuts: false };
     pub const BEST: Effort =
-        Effort { bins: BINS, samples: ALL, one_axis: false, strip: 1, even: 4.0, mends: true };
+        Effort { bins: BINS, samples: ALL, one_axis: false, strip: 1, even: 4.0, cuts: true };
 
     /// The effort where few refs are much larger than the others, such as the walls of a building: a sample says nothing
     /// of them, and where they are parted matters. `None` for scenes that are even enough.

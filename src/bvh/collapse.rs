@@ -82,7 +82,7 @@ enum Kind {
 
 /// The binary tree, and what decides about it.
 ///
-/// A ray that enters a box pays 1 for the bundle or the leaf block in it, whatever that holds;
+/// A ray that enters a box pays 1 for the bundle in it, or [a little more](LEAF) for the leaf block, whatever that holds;
 /// boxes are entered in proportion to their area. `price` is added for each leaf block, and to each
 /// bundle in proportion to its bytes: it breaks ties, and a higher one saves memory. Leaf blocks
 /// hold at most 16 triangles over 16 vertices, or 15 spheres.
@@ -96,6 +96,10 @@ pub(super) struct Grounds<'t> {
     /// Whether leaves are not to be put together: visiting an instance costs more than telling it from others.
     pub alone: bool,
 }
+
+/// What a leaf block costs, in bundles. Where it may as well be a bundle over blocks of its own, with boxes that are little
+/// smaller, that is better, as triangles of a few blocks are rarely all large.
+pub(super) const LEAF: f32 = 1.1;
 
 /// What is decided and still to be part of something: the last subtree first.
 ///
@@ -166,7 +170,7 @@ impl<const W: usize> Decided<W> {
         let Grounds { ids, areas, price, .. } = *grounds;
         let (count, is_sphere) = Grown::of(node);
         self.aabb = node.aabb();
-        self.cost = [areas.of(&self.aabb) + price; W];
+        self.cost = [LEAF * areas.of(&self.aabb) + price; W];
         self.lanes = 1;
         self.content.count = count;
         if is_sphere {
@@ -200,7 +204,7 @@ fn join<const W: usize>(
     let area = areas.of(&aabb);
     let content = left.content.with(&right.content);
     let (shared, split) = share(left, right);
-    let block = if content.kind == Kind::Much { f32::INFINITY } else { area + price };
+    let block = if content.kind == Kind::Much { f32::INFINITY } else { LEAF * area + price };
     let bundle = area + price * bundle_price(W) + shared[W - 1];
     let is_leaf = block <= bundle;
     let one = if is_leaf { block } else { bundle };

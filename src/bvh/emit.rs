@@ -190,7 +190,7 @@ mod tests {
     use crate::bvh::bins::Effort;
     use crate::bvh::branch::grow;
     use crate::bvh::choose::choose;
-    use crate::bvh::collapse::Grounds;
+    use crate::bvh::collapse::{Grounds, LEAF};
     use crate::bvh::refs::PrimRef;
     use crate::bvh::split::Areas;
     use crate::bvh::tree::Limits;
@@ -262,7 +262,7 @@ mod tests {
         let at = &nodes[node];
         let area = areas().of(&at.aabb());
         if at.is_leaf() {
-            return (area + PRICE, at.lanes & 0xff);
+            return (LEAF * area + PRICE, at.lanes & 0xff);
         }
         let first = at.first as usize;
         let below = [lanes(nodes, fates, first), lanes(nodes, fates, first + 1)].concat();
@@ -272,7 +272,7 @@ mod tests {
             sum = (sum.0 + cost, sum.1 + spheres);
         }
         let own = match fates[first / 2 - 1] {
-            Fate::Leaf if sum.1 <= 15 => area + PRICE,
+            Fate::Leaf if sum.1 <= 15 => LEAF * area + PRICE,
             Fate::Bundle if below.len() <= width => {
                 area + PRICE * (28 * width) as f32 / 256.0 + sum.0
             }
@@ -305,8 +305,8 @@ mod tests {
             .for_each_bundle::<W>(|_, lanes| {
                 assert!((1..=W).contains(&lanes.len()));
                 for lane in lanes {
-                    let bytes = if lane.is_leaf { 256 } else { 28 * W };
-                    sum += area(lane.node) + PRICE * bytes as f32 / 256.0;
+                    let (cost, bytes) = if lane.is_leaf { (LEAF, 256) } else { (1.0, 28 * W) };
+                    sum += cost * area(lane.node) + PRICE * bytes as f32 / 256.0;
                 }
                 Some(())
             })

@@ -207,12 +207,13 @@ fn grow_tree(
     let refs = storage::view_mut::<PrimRef>(bytes, places.refs, places.room)?;
     let Gathered { count, strip, leaves } = gather_strips(scene, census, places.leaves, how, refs);
     let uneven = how.effort.for_uneven(unevenness(refs.get(..count)?, areas, how.caller));
-    let mends = uneven.is_some_and(|effort| effort.mends);
     // Spheres are not cut, nor is what will move.
-    let cut = mends && census.sphere_count == 0 && !census.refit;
-    let places = match mends {
-        true => places.for_uneven(cut, bytes.len()),
-        false => Places { leaves, ..places },
+    let cut = uneven.is_some_and(|effort| effort.cuts) && census.sphere_count == 0 && !census.refit;
+    let places = match uneven {
+        Some(effort) if effort.cuts => places.for_uneven(cut, bytes.len()),
+        // Here, too, a wall shall not be in a leaf with a chair.
+        Some(_) => Places { leaves: places.leaves.min(count).max(leaves), ..places },
+        None => Places { leaves, ..places },
     };
     let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
@@ -229,7 +230,7 @@ fn grow_tree(
     };
     let size = grow(nodes, slots, count, &limits, how.caller)?;
     let (free, ids) = ids_to_end(refs, &size)?;
-    if mends {
+    if uneven.is_some() {
         mend(nodes.get_mut(..size.nodes)?, ids, areas, free)?;
     }
     Scratch::new(&places, &size)
