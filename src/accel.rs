@@ -331,7 +331,7 @@ impl<'m> Accel<'m> {
     /// which the answer is the first of these hits. At a shared edge or vertex every triangle that is
     /// met comes. Nothing is allocated; a few hits at a time are looked for.
     pub fn hits(&self, ray: &Ray, options: &QueryOptions) -> Hits<'m> {
-        Hits::new(self.0, *ray, self.choice(options))
+        Hits::new(self.0, *ray, *options)
     }
 
     /// The nearest of the [hits](Self::hits), as many as `hits` has room for, in one search that does not
@@ -352,7 +352,7 @@ impl<'m> Accel<'m> {
         last: &mut Option<HitKey>,
         hits: &mut [Hit],
     ) -> usize {
-        hits::fill(self.0, ray, self.choice(options), last, hits)
+        hits::fill(self.0, ray, options, last, hits)
     }
 
     /// The point closest to `point` on the triangles and the surfaces of spheres, of those that the mask and

@@ -34,7 +34,7 @@ pub(crate) fn closest<D: Across, W: Watch>(
         let hit = ask(place.block, ray, question)?;
         Some(Hit { instance: place.instance, ..hit })
     };
-    let own = Shown { block, instance: NONE };
+    let own = Shown::own(block);
     let mut best = ask_in(&own, ray).map(|hit| Best { hit, shown: own, ray: *ray });
     let limited = |best: &Option<Best>| Ray {
         t_max: best.as_ref().map_or(ray.t_max, |best| best.limit(ray)),
@@ -69,7 +69,7 @@ pub(crate) fn any<D: Decide, W: Watch>(
     let mut is_hit_in = |place: &Shown, ray: &Ray| {
         ask(place.block, ray, AnyHit::<D, _>::new(place.choice(options), watch.lend()))
     };
-    if is_hit_in(&Shown { block, instance: NONE }, ray) {
+    if is_hit_in(&Shown::own(block), ray) {
         return true;
     }
     let mut hit = false;
@@ -84,14 +84,20 @@ pub(crate) fn any<D: Decide, W: Watch>(
 
 /// The block of an instance, or the one that has instances.
 #[derive(Clone, Copy)]
-struct Shown<'m> {
-    block: Finished<'m>,
-    instance: u32,
+pub(crate) struct Shown<'m> {
+    pub block: Finished<'m>,
+    /// [`NONE`] for the one that has them.
+    pub instance: u32,
 }
 
 impl<'m> Shown<'m> {
+    /// That of no instance.
+    pub fn own(block: Finished<'m>) -> Self {
+        Shown { block, instance: NONE }
+    }
+
     /// That of an instance, if `options` leave it.
-    fn of(
+    pub fn of(
         level: &Level<'m>,
         instance: u32,
         options: &QueryOptions,
@@ -102,7 +108,8 @@ impl<'m> Shown<'m> {
         Some((Shown { block, instance }, record))
     }
 
-    fn choice(&self, options: &QueryOptions) -> Choice {
+    /// What `options` leave of it.
+    pub fn choice(&self, options: &QueryOptions) -> Choice {
         let block = self.block.parts();
         Choice::new(options, self.instance, block.geometries, block.header.prim_limit)
     }
@@ -161,11 +168,11 @@ impl Across for Watertight {
 
 /// What is done for each instance that a ray comes to: it gets the number, and returns a limit of `t` of what is still of
 /// interest, or `None` to end the search.
-type Visit<'v> = dyn FnMut(u32) -> Option<f32> + 'v;
+pub(crate) type Visit<'v> = dyn FnMut(u32) -> Option<f32> + 'v;
 
 /// Calls `visit` for each instance whose rounded ray may hit something, near ones first as far as the index is a tree, and
 /// hardly ever twice.
-fn visit_reached(level: &Level, ray: &Ray, visit: &mut Visit) {
+pub(crate) fn visit_reached(level: &Level, ray: &Ray, visit: &mut Visit) {
     let index = level.index.header();
     let farthest = ray.origin.iter().fold(0.0f32, |farthest, x| farthest.max(x.abs()));
     let beyond = f64::from(farthest) - f64::from(level.head.calm);

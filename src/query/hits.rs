@@ -77,18 +77,13 @@ impl<'m, 'h> NextHits<'m, 'h> {
         }
     }
 
-    /// Writes over each kept meeting what `record` makes of it; returns how many they are, and the root of the last.
-    pub fn finish(
-        &mut self,
-        ray: &PreparedRay,
-        record: impl Fn(&ExactMet) -> Hit,
-    ) -> (usize, usize) {
-        let root = self.kept[..self.count].last().map_or(0, root_of);
+    /// Writes over each kept meeting what `record` makes of it; returns how many they are.
+    pub fn finish(&mut self, ray: &PreparedRay, record: impl Fn(&ExactMet) -> Hit) -> usize {
         for i in 0..self.count {
             let met = self.meet_again(ray, &self.kept[i]);
             self.kept[i] = met.as_ref().map_or(Hit::MISS, &record);
         }
-        (self.count, root)
+        self.count
     }
 
     fn consider(&mut self, ray: &PreparedRay, met: &ExactMet) {

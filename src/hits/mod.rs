@@ -1,8 +1,12 @@
 //! Lists of hits: all of them in order, a few at a time.
 
+mod instances;
+
 use crate::block::{Block, Finished};
+use crate::levels::Shown;
 use crate::query::{
-    Choice, Decide, Exact, ExactMet, Filter, Meets, NextHits, PrimId, Wanted, flat_number,
+    Choice, Decide, Exact, ExactMet, Filter, Meets, NextHits, PrimId, QueryOptions, Wanted,
+    flat_number,
 };
 use crate::ray::{Hit, PreparedRay, Ray};
 use crate::trace::{self, LocateHit, Question};
@@ -25,7 +29,7 @@ pub struct HitKey {
 pub struct Hits<'m> {
     block: Finished<'m>,
     ray: Ray,
-    choice: Choice,
+    options: QueryOptions,
     last: Option<HitKey>,
     /// What the last search has found, of which `next..count` are still to be given.
     found: [Hit; FETCH],
@@ -37,10 +41,10 @@ pub struct Hits<'m> {
 const FETCH: usize = 8;
 
 impl<'m> Hits<'m> {
-    pub(crate) fn new(block: Finished<'m>, ray: Ray, choice: Choice) -> Self {
+    pub(crate) fn new(block: Finished<'m>, ray: Ray, options: QueryOptions) -> Self {
         // As if one search had filled the room and all of it had been given.
         let (next, count) = (FETCH, FETCH);
-        Hits { block, ray, choice, last: None, found: [Hit::MISS; FETCH], next, count }
+        Hits { block, ray, options, last: None, found: [Hit::MISS; FETCH], next, count }
     }
 }
 
@@ -49,8 +53,8 @@ impl Iterator for Hits<'_> {
 
     fn next(&mut self) -> Option<Hit> {
         if self.next == FETCH {
-            let Hits { block, ray, choice, .. } = self;
-            self.count = fill(*block, ray, *choice, &mut self.last, &mut self.found);
+            let Hits { block, ray, options, .. } = self;
+            self.count = fill(*block, ray, options, &mut self.last, &mut self.found);
             self.next = 0;
         }
         let hit = self.found[..self.count].get(self.next).copied()?;
@@ -71,36 +75,63 @@ impl core::fmt::Debug for Hits<'_> {
 pub(crate) fn fill(
     block: Finished,
     ray: &Ray,
-    choice: Choice,
+    options: &QueryOptions,
     last: &mut Option<HitKey>,
     hits: &mut [Hit],
 ) -> usize {
-    let mut ray = *ray;
+    let count = match block.level() {
+        None => fill_marked(&Shown::own(block), ray, options, last, hits),
+        Some(level) => instances::fill(block, &level, ray, options, last, hits),
+    };
+    hits.iter_mut().take(count).for_each(|hit| hit.u = hit.u.max(0.0));
+    count
+}
+
+/// The weight of a hit for which this one stands for now: where the ray leaves a sphere.
+const LEAVES: f32 = -1.0;
+
+/// The first hits after `last` that are in no instance, where the ray leaves a sphere [marked](LEAVES). All keys and hits are as if the
+/// block stood alone.
+fn fill_marked(
+    shown: &Shown,
+    ray: &Ray,
+    options: &QueryOptions,
+    last: &mut Option<HitKey>,
+    hits: &mut [Hit],
+) -> usize {
+    let (block, mut ray) = (shown.block, *ray);
     let mut after = None;
     if let Some(key) = last {
         after = locate(block, &ray, key);
         if after.is_none() {
             return 0;
         }
-        // The real `t` is above this. Limits that are no numbers stay.
-        let below = key.t.next_down();
-        if below > ray.t_min {
-            ray.t_min = below;
-        }
+        ray = from(&ray, key);
     }
     if hits.is_empty() {
         return 0;
     }
-    let (count, root) = trace::ask(block, &ray, HitsAfter { choice, after, hits });
+    let choice = shown.choice(options);
+    let count = trace::ask(block, &ray, HitsAfter { choice, after, hits });
     if let Some(hit) = hits[..count].last() {
-        let Hit { prim, geometry, instance, t, .. } = *hit;
-        let id = PrimId { prim, geometry, instance };
-        *last = Some(HitKey { id, root: root as u32, t });
+        *last = Some(key_of(hit));
     }
     count
 }
 
-/// The meeting that `key` names.
+/// The key of a hit that is marked if the ray leaves a sphere there.
+fn key_of(hit: &Hit) -> HitKey {
+    let Hit { prim, geometry, instance, t, u, .. } = *hit;
+    HitKey { id: PrimId { prim, geometry, instance }, root: (u == LEAVES).into(), t }
+}
+
+/// A ray that begins where the hit of `key` is, or just before: its real `t` is above that. Limits that are no numbers stay.
+fn from(ray: &Ray, key: &HitKey) -> Ray {
+    let below = key.t.next_down();
+    Ray { t_min: if below > ray.t_min { below } else { ray.t_min }, ..*ray }
+}
+
+/// The meeting that `key` names, in a block that stands alone.
 fn locate(block: Finished, ray: &Ray, key: &HitKey) -> Option<ExactMet> {
     let Block { geometries, header, .. } = block.parts();
     let prim = flat_number(&key.id, geometries, header.prim_limit)?;
@@ -119,8 +150,8 @@ struct HitsAfter<'h> {
 
 impl<'m, 'h> Question<'m> for HitsAfter<'h> {
     type Query = NextHits<'m, 'h>;
-    /// How many, and the root of the last.
-    type Answer = (usize, usize);
+    /// How many.
+    type Answer = usize;
     const RARE: bool = true;
 
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
@@ -130,11 +161,13 @@ impl<'m, 'h> Question<'m> for HitsAfter<'h> {
 
     fn answer(block: &Block, ray: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
         query.finish(ray, |met| {
-            trace::record(block, met.place(), Exact::t(ray, met, &mut ()), Exact::weights(met))
+            let t = Exact::t(ray, met, &mut ());
+            let hit = trace::record(block, met.place(), t, Exact::weights(met));
+            Hit { u: if met.root() == 1 { LEAVES } else { hit.u }, ..hit }
         })
     }
 
     fn nothing() -> Self::Answer {
-        (0, 0)
+        0
     }
 }
