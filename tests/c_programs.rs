@@ -110,6 +110,11 @@ fn hits() {
 }
 
 #[test]
+fn closest() {
+    program("closest", "c_tests/closest.c", false, &["-std=c11"]);
+}
+
+#[test]
 fn control() {
     program("control", "c_tests/control.c", false, &["-std=c11", "-frounding-math"]);
 }

@@ -51,6 +51,7 @@ fn triangles_keep_their_bound() {
         most = most.max(part);
     }
     std::println!("triangles use {most:.3} of the bound");
+    assert!(most > 0.005, "{most}: too easy");
 }
 
 #[test]
@@ -71,6 +72,7 @@ fn spheres_keep_their_bound() {
         most = most.max(part);
     }
     std::println!("spheres use {most:.3} of the bound");
+    assert!(most > 0.01, "{most}: too easy");
 }
 
 #[test]
