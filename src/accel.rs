@@ -370,7 +370,7 @@ impl<'m> Accel<'m> {
         radius: f32,
         options: &QueryOptions,
     ) -> Option<PointHit> {
-        closest::closest_point(self.0, point, radius, self.choice(options))
+        closest::closest_point(self.0, point, radius, options)
     }
 
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when

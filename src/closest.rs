@@ -3,10 +3,12 @@
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
+use crate::levels::Shown;
 use crate::math::float::sqrt;
-use crate::point::Nearest;
+use crate::math::wide;
+use crate::point::{Image, Nearest, square_between};
 use crate::prim::Leaves;
-use crate::query::{Choice, Filter, clamped_weights, geometry_of};
+use crate::query::{Filter, QueryOptions, clamped_weights, geometry_of};
 use crate::ray::NONE;
 
 /// The point of a scene that is closest to a given one.
@@ -28,27 +30,56 @@ pub struct PointHit {
     pub instance: u32,
 }
 
-/// The closest point within `radius` of `point` on what `choice` leaves.
+/// The closest point within `radius` of `point` on what `options` leave.
 pub(crate) fn closest_point(
     block: Finished,
     point: [f32; 3],
     radius: f32,
-    choice: Choice,
+    options: &QueryOptions,
 ) -> Option<PointHit> {
     // A NaN is within no radius.
     if !(radius >= 0.0) || !point.iter().all(|x| x.is_finite()) {
         return None;
     }
-    let block = &block.parts();
+    let radius = f64::from(if radius > f32::MAX { f32::MAX } else { radius });
+    let ask_in = |shown: &Shown, image, limit| closest_in(shown, image, point, limit, options);
+    let mut best = ask_in(&Shown::own(block), Image::SAME, radius * radius);
+    let level = block.level();
+    for number in 0..level.as_ref().map_or(0, |level| level.instances.len() as u32) {
+        let limit = best.as_ref().map_or(radius * radius, |(square, _)| *square);
+        let found = level.as_ref().and_then(|level| {
+            let (shown, record) = Shown::of(level, number, options)?;
+            let near = square_between(wide(point), &record.bounds) <= limit;
+            near.then(|| ask_in(&shown, Image::new(record.map()), limit)).flatten()
+        });
+        // Of equally close ones the first stays.
+        if let Some((square, _)) = found
+            && best.as_ref().is_none_or(|(least, _)| square < *least)
+        {
+            best = found;
+        }
+    }
+    best.map(|(_, hit)| hit)
+}
+
+/// The closest point in one instance, or in none, no farther than the root of `limit`; and the square of its distance.
+fn closest_in(
+    shown: &Shown,
+    image: Image,
+    point: [f32; 3],
+    limit: f64,
+    options: &QueryOptions,
+) -> Option<(f64, PointHit)> {
+    let (choice, block) = (shown.choice(options), &shown.block.parts());
     let filter = Filter::new(choice, block.geometries, block.prim_ids);
-    let radius = if radius > f32::MAX { f32::MAX } else { radius };
-    let mut nearest = Nearest::new(point, radius, block.header.reach, filter, Leaves::of(block));
+    let leaves = Leaves::of(block);
+    let mut nearest = Nearest::new(image, point, limit, block.header.reach, filter, leaves);
     search(block, &mut nearest);
     let (number, foot) = nearest.best()?;
     let (geometry, first) =
         geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
     let [u, v] = clamped_weights(foot.weights.map(|weight| weight as f32));
-    Some(PointHit {
+    let hit = PointHit {
         distance: sqrt(foot.square) as f32,
         // Adding +0 turns -0 into +0.
         point: foot.point.to_array().map(|x| x as f32 + 0.0),
@@ -56,8 +87,9 @@ pub(crate) fn closest_point(
         v,
         prim: number - first,
         geometry,
-        instance: NONE,
-    })
+        instance: shown.instance,
+    };
+    Some((foot.square, hit))
 }
 
 fn search(block: &Block, nearest: &mut Nearest) {

@@ -25,7 +25,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         "prim",
         &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
     ),
-    ("point", &["block", "math", "prim", "query"]),
+    ("point", &["block", "instance", "math", "prim", "query"]),
     ("choice", &["block", "math", "prim", "scene"]),
     ("list", &["block", "error", "prim", "scene"]),
     (
@@ -43,8 +43,8 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
     ("levels", &["block", "instance", "math", "prim", "query", "ray", "simd", "trace"]),
-    ("hits", &["block", "query", "ray", "trace"]),
-    ("closest", &["block", "bvh", "grid", "math", "point", "prim", "query", "ray"]),
+    ("hits", &["block", "levels", "query", "ray", "trace"]),
+    ("closest", &["block", "bvh", "grid", "levels", "math", "point", "prim", "query", "ray"]),
     (
         "accel",
         &[

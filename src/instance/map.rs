@@ -49,7 +49,7 @@ impl Map {
         let (lower, upper) = (clamped(aabb.lower), clamped(aabb.upper));
         let (mut least, mut most) = (self.shift(), self.shift());
         let mut size = self.shift().abs();
-        for (k, column) in self.columns().into_iter().enumerate() {
+        for (k, column) in self.linear().into_iter().enumerate() {
             let (p, q) = (column * lower[k], column * upper[k]);
             least += p.min(q);
             most += p.max(q);
@@ -95,7 +95,7 @@ impl Map {
 
     /// `|A| v`.
     pub fn widest(&self, v: DVec3) -> DVec3 {
-        let [x, y, z] = self.columns().map(DVec3::abs);
+        let [x, y, z] = self.linear().map(DVec3::abs);
         x * v.x + y * v.y + z * v.z
     }
 
@@ -104,7 +104,8 @@ impl Map {
         DVec3::from(self.world_to_object.map(|row| DVec3::from(row).abs().dot(v)))
     }
 
-    fn columns(&self) -> [DVec3; 3] {
+    /// The columns of `A`.
+    pub fn linear(&self) -> [DVec3; 3] {
         let m = &self.object_to_world;
         [0, 1, 2].map(|k| wide([m[k], m[4 + k], m[8 + k]]))
     }
@@ -117,7 +118,7 @@ impl Map {
 
     /// `A p + b`.
     pub fn point(&self, p: DVec3) -> DVec3 {
-        let [x, y, z] = self.columns();
+        let [x, y, z] = self.linear();
         x * p.x + y * p.y + z * p.z + self.shift()
     }
 

@@ -4,6 +4,8 @@
 //! first. All arithmetic is `f64` in one order of operations, whatever the structure, so the answer has the same bits
 //! from all of them; how far it can be from the real one, `docs/METHODS.md` derives.
 
+mod ellipsoid;
+mod image;
 mod shape;
 #[cfg(test)]
 mod tests;
@@ -15,11 +17,16 @@ use crate::math::float::sqrt;
 use crate::math::{Aabb, wide};
 use crate::prim::{Lanes, Leaves};
 use crate::query::Filter;
+pub(crate) use image::Image;
 use shape::Foot;
 
 /// What is closest so far.
 pub(crate) struct Nearest<'m> {
+    /// Where the point is, to boxes.
     point: DVec3,
+    /// Where it is to primitives, or rather to their images.
+    world: DVec3,
+    image: Image,
     filter: Filter<'m>,
     leaves: Leaves<'m>,
     /// What computed distances to primitives and boxes may be off, together.
@@ -40,20 +47,22 @@ pub(crate) struct Nearest<'m> {
 const SLACK: f64 = 1.0 / (1u64 << 42) as f64;
 
 impl<'m> Nearest<'m> {
-    /// Nothing yet within `radius` of `point`. `reach` is the largest coordinate of the scene.
+    /// Nothing yet of what `image` makes of a block's primitives; what is not farther from `point` than the root of `limit`
+    /// counts. `reach` is the largest coordinate of the block.
     pub fn new(
+        image: Image,
         point: [f32; 3],
-        radius: f32,
+        limit: f64,
         reach: f32,
         filter: Filter<'m>,
         leaves: Leaves<'m>,
     ) -> Self {
-        let (point, radius) = (wide(point), f64::from(radius));
-        let slack = (point.abs().max_element() + f64::from(reach)) * SLACK;
-        let limit = radius * radius;
-        let sight = radius;
+        let world = wide(point);
+        let (point, size) = image.origin_of(world, f64::from(reach));
+        let slack = size * SLACK;
+        let (sight, bound, best) = (f64::INFINITY, 0.0, None);
         let mut nearest =
-            Nearest { point, filter, leaves, slack, limit, sight, bound: 0.0, best: None };
+            Nearest { point, world, image, filter, leaves, slack, limit, sight, bound, best };
         nearest.narrow();
         nearest
     }
@@ -67,13 +76,14 @@ impl<'m> Nearest<'m> {
     /// Sets the bound by how far to look, by the limit and by what is closest so far.
     fn narrow(&mut self) {
         let best = self.best.map_or(self.limit, |(_, foot)| foot.square);
-        let widened = self.sight.min(sqrt(best)) + self.slack;
+        let widened = self.sight.min(sqrt(best) * self.image.shrinks()) + self.slack;
         self.bound = widened * widened;
     }
 
     /// Whether what is closest of all lies within this distance, or nothing does: then there is no need to look farther.
     pub fn is_settled_within(&self, distance: f64) -> bool {
         let far = self.best.map_or(self.limit, |(_, foot)| foot.square);
+        let distance = distance / self.image.shrinks();
         far <= distance * distance
     }
 
@@ -95,12 +105,7 @@ impl<'m> Nearest<'m> {
     /// The square of the distance to a box; infinite to an empty one.
     #[inline(always)]
     pub fn square_to(&self, aabb: &Aabb) -> f64 {
-        let (below, above) = (wide(aabb.lower) - self.point, self.point - wide(aabb.upper));
-        let gap = |a: f64, b: f64| {
-            let gap = if a > b { a } else { b };
-            if gap > 0.0 { gap * gap } else { 0.0 }
-        };
-        gap(below.x, above.x) + gap(below.y, above.y) + gap(below.z, above.z)
+        square_between(self.point, aabb)
     }
 
     /// Considers all primitives.
@@ -133,7 +138,8 @@ impl<'m> Nearest<'m> {
             for lane in Lanes(lanes & block.lanes()) {
                 let corners = block.triangle(lane);
                 if self.is_within(self.square_to(&Aabb::around(&corners))) {
-                    let foot = shape::on_triangle(self.point, corners);
+                    let corners = corners.map(|corner| self.image.of(corner));
+                    let foot = shape::on_triangle(self.world, corners);
                     self.consider(Place::of_lane(number as u32, block.first, lane as u32), foot);
                 }
             }
@@ -141,7 +147,7 @@ impl<'m> Nearest<'m> {
             let Some(block) = self.leaves.sphere_blocks.get(number) else { return };
             for lane in Lanes(lanes & block.lanes()) {
                 let (centre, radius) = block.sphere(lane);
-                let foot = shape::on_sphere(self.point, centre, radius);
+                let foot = self.image.foot_on_sphere(self.world, centre, radius);
                 self.consider(Place::of_lane(number as u32, block.first, lane as u32), foot);
             }
         }
@@ -160,4 +166,15 @@ impl<'m> Nearest<'m> {
             self.narrow();
         }
     }
+}
+
+/// The square of the distance of a point and a box; infinite for an empty one.
+#[inline(always)]
+pub(crate) fn square_between(point: DVec3, aabb: &Aabb) -> f64 {
+    let (below, above) = (wide(aabb.lower) - point, point - wide(aabb.upper));
+    let gap = |a: f64, b: f64| {
+        let gap = if a > b { a } else { b };
+        if gap > 0.0 { gap * gap } else { 0.0 }
+    };
+    gap(below.x, above.x) + gap(below.y, above.y) + gap(below.z, above.z)
 }

@@ -21,8 +21,7 @@ pub(crate) struct Foot {
 /// but for rounding, so none can be closer than the closest real one; and where the foot of a thin triangle
 /// is far off, an edge is close to the real one. The third vertex and the point are taken across the first edge before they
 /// are compared, so what remains of a thin triangle is not lost against its length.
-pub(super) fn on_triangle(point: DVec3, corners: [[f32; 3]; 3]) -> Foot {
-    let [a, b, c] = corners.map(wide);
+pub(super) fn on_triangle(point: DVec3, [a, b, c]: [DVec3; 3]) -> Foot {
     let (ab, ac, ap) = (b - a, c - a, point - a);
     let at = |[v, w]: [f64; 2]| {
         let along = v * ab + w * ac;

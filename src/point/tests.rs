@@ -45,7 +45,7 @@ fn triangles_keep_their_bound() {
         let far = if random.below(5) == 0 { 0.0 } else { 2f64.powf(random.between(-40.0, 20.0)) };
         let point = beside(&mut random, corners, far);
         let Some(distance) = to_triangle(point, corners) else { continue };
-        let foot = shape::on_triangle(wide(point), corners);
+        let foot = shape::on_triangle(wide(point), corners.map(wide));
         let part = used(&foot, distance, longest_edge(corners));
         assert!(part <= 1.0, "{part}: {point:?} {corners:?} {foot:?} {distance:e}");
         most = most.max(part);
@@ -86,9 +86,61 @@ fn known_feet() {
         ([7.0, 0.0, 4.0], 25.0, [1.0, 0.0]),
         ([0.0, 8.0, 3.0], 25.0, [0.0, 1.0]),
     ] {
-        let foot = shape::on_triangle(wide(point), corners);
+        let foot = shape::on_triangle(wide(point), corners.map(wide));
         assert_eq!((foot.square, foot.weights), (square, weights), "{point:?}");
     }
     let centre = shape::on_sphere(wide([1.0; 3]), [1.0; 3], 2.0);
     assert_eq!((centre.square, centre.point), (4.0, DVec3::new(3.0, 1.0, 1.0)));
+}
+
+/// The columns of a map that stretches by up to 2^10 times as much along one axis as along another.
+fn columns(random: &mut Random) -> [DVec3; 3] {
+    let turned = [0; 3].map(|_| DVec3::from(random.direction()));
+    turned.map(|column| 2f64.powf(random.between(-5.0, 5.0)) * column)
+}
+
+#[test]
+fn no_point_of_an_ellipsoid_is_closer() {
+    let mut random = Random::new(3);
+    for round in 0..3_000 {
+        let axes = columns(&mut random);
+        let image = |n: DVec3| axes[0] * n.x + axes[1] * n.y + axes[2] * n.z;
+        let centre = DVec3::from(random.direction());
+        // Anywhere, on the surface, at the centre, and across one of the axes.
+        let n = DVec3::from(random.direction());
+        let point = match round % 4 {
+            0 => centre + 2f64.powf(random.between(-10.0, 10.0)) * DVec3::from(random.direction()),
+            1 => centre + image(n),
+            2 => centre,
+            _ => centre + random.between(-2.0, 2.0) * axes[0].cross(axes[1]),
+        };
+        let foot = ellipsoid::on_ellipsoid(point, centre, axes);
+        let size = axes.iter().map(|axis| axis.length()).fold(0.0, f64::max);
+        let distance = sqrt(foot.square);
+        let allowed = (distance + size) * 2f64.powi(-40);
+        let away = foot.point - centre;
+        let inverse = glam::DMat3::from_cols(axes[0], axes[1], axes[2]).inverse();
+        let unit = (inverse * away).normalize();
+        assert!((image(unit) - away).length() <= size * 1e-9, "{round}: not on it");
+        for _ in 0..200 {
+            let near = 2f64.powf(random.between(-24.0, 1.0));
+            let other = (unit + near * DVec3::from(random.direction())).normalize();
+            let there = (centre + image(other) - point).length();
+            assert!(there >= distance - allowed, "{round}: {there:e} {distance:e} {axes:?}");
+        }
+    }
+}
+
+#[test]
+fn a_round_ellipsoid_is_a_sphere() {
+    let mut random = Random::new(4);
+    for _ in 0..1_000 {
+        let (centre, radius) = (random.direction().map(|x| x as f32), random.between(0.1, 3.0));
+        let point = 3.0 * DVec3::from(random.direction());
+        let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| f64::from(radius as f32) * axis);
+        let foot = ellipsoid::on_ellipsoid(point, wide(centre), axes);
+        let expected = shape::on_sphere(point, centre, radius as f32);
+        assert!((sqrt(foot.square) - sqrt(expected.square)).abs() < 1e-12);
+        assert!((foot.point - expected.point).length() < 1e-9, "{foot:?} {expected:?}");
+    }
 }
