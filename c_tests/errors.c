@@ -8,7 +8,7 @@ static uint32_t indices[4] = {0, 1, 2, 0};
 static RtMesh mesh;
 static RtScene scene;
 static RtBuildOptions options;
-static bool seen[RT_ERROR_INTERNAL + 1];
+static bool seen[RT_ERROR_LINKED + 1];
 
 static void reset(void) {
     memset(&mesh, 0, sizeof mesh);
@@ -47,6 +47,27 @@ static void refused(RtStatus status, int line) {
 
 #define REFUSED(status, change) (change, refused(status, __LINE__))
 
+static void check_instances(void) {
+    reset();
+    const RtAccel *child = built(&scene, false, NULL);
+    const RtInstance good = {child, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}, 0, 0};
+    RtInstance instance = good;
+    RtScene nesting = scene_of(NULL, 0, NULL, 0);
+    nesting.instance_count = 1;
+    nesting.instances = &good;
+    const RtAccel *nested = built(&nesting, false, NULL);
+#define WITH(change) (scene.instance_count = 1, scene.instances = &instance, instance = good, change)
+    REFUSED(RT_ERROR_NULL_POINTER, WITH(instance.accel = NULL));
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, WITH(instance.reserved = 1));
+    REFUSED(RT_ERROR_SINGULAR, WITH(instance.object_to_world[5] = 0));
+    REFUSED(RT_ERROR_SINGULAR, WITH(instance.object_to_world[3] = 1e38f * 100));
+    REFUSED(RT_ERROR_NESTED, WITH(instance.accel = nested));
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, WITH(scene.instance_size = sizeof instance - 8));
+    const RtAccel *out = NULL;
+    CHECK(rt_accel_open(nested, rt_accel_size(nested), &out) == RT_ERROR_LINKED && out == NULL);
+    seen[RT_ERROR_LINKED] = true;
+}
+
 static void check_builds(void) {
     reset();
     REFUSED(RT_ERROR_INVALID_ARGUMENT, scene.struct_size = 0);
@@ -59,9 +80,7 @@ static void check_builds(void) {
     REFUSED(RT_ERROR_MISALIGNED, scene.meshes = (const RtMesh *)((const char *)&mesh + 1));
     REFUSED(RT_ERROR_INVALID_ARGUMENT, scene.mesh_size = sizeof mesh - 4);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, scene.mesh_size = sizeof mesh + 1);
-    RtInstance instance;
-    memset(&instance, 0, sizeof instance);
-    REFUSED(RT_ERROR_UNSUPPORTED, (scene.instance_count = 1, scene.instances = &instance));
+    check_instances();
     REFUSED(RT_ERROR_INVALID_ARGUMENT, mesh.reserved = 1);
     REFUSED(RT_ERROR_NULL_POINTER, mesh.vertices = NULL);
     REFUSED(RT_ERROR_MISALIGNED, mesh.vertices = (const float *)((const char *)vertices + 1));
@@ -210,5 +229,6 @@ int main(void) {
     check_memory();
     check_open_and_queries();
     for (RtStatus i = RT_OK + 1; i < RT_ERROR_INTERNAL; i++) CHECK(seen[i]);
+    for (RtStatus i = RT_ERROR_SINGULAR; i <= RT_ERROR_LINKED; i++) CHECK(seen[i]);
     return 0;
 }

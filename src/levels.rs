@@ -28,7 +28,7 @@ pub(crate) fn closest<D: Across, W: Watch>(
     options: &QueryOptions,
     mut watch: W,
 ) -> Option<Hit> {
-    let Some(level) = block.level() else { return None };
+    let level = block.level()?;
     let mut ask_in = |place: &Shown, ray: &Ray| {
         let question = ClosestHit::<D, _, 1>::new(place.choice(options), watch.lend());
         let hit = ask(place.block, ray, question)?;

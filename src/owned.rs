@@ -83,6 +83,16 @@ impl OwnedAccel<'_> {
         refit(self.memory.bytes_mut(), moved, &Caller::new(threads, None))
     }
 
+    /// The structure and all that it refers to as one block, which borrows nothing; see [`Accel::pack`].
+    pub fn packed(&self) -> Result<OwnedAccel<'static>, BuildError> {
+        let accel = self.accel();
+        let size = accel.pack_needs()?.size;
+        let memory = AlignedMemory::new(size);
+        let mut memory = memory.ok_or(BuildError::OutOfMemory { minimum: size })?;
+        accel.pack_into(memory.bytes_mut())?;
+        Ok(OwnedAccel { memory: memory.shrunk(size), children: PhantomData })
+    }
+
     /// The structure. Cheap, but not free: keep the view while tracing.
     pub fn accel(&self) -> Accel<'_> {
         Accel::recognise(self.memory.bytes()).expect("a built block has a sound header")

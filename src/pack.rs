@@ -36,7 +36,12 @@ impl Accel<'_> {
         if !memory.as_ptr().addr().is_multiple_of(alignment) {
             return Err(BuildError::Misaligned);
         }
-        let bytes = storage::zeroed(memory.get_mut(..minimum).ok_or(short)?);
+        self.pack_into(storage::zeroed(memory.get_mut(..minimum).ok_or(short)?))
+    }
+
+    /// The same into as many bytes as it needs, aligned as blocks are.
+    pub(crate) fn pack_into<'p>(&self, bytes: &'p mut [u8]) -> Result<Accel<'p>, BuildError> {
+        let short = BuildError::OutOfMemory { minimum: bytes.len() };
         self.write_packed(bytes).ok_or(short)?;
         Accel::recognise(bytes).map_err(|_| short)
     }

@@ -115,6 +115,11 @@ fn closest() {
 }
 
 #[test]
+fn instances() {
+    program("instances", "c_tests/instances.c", false, &["-std=c11"]);
+}
+
+#[test]
 fn control() {
     program("control", "c_tests/control.c", false, &["-std=c11", "-frounding-math"]);
 }

@@ -6,19 +6,15 @@ mod common;
 
 use common::{All, agreed, bits};
 use raykern::{
-    Accel, BuildError, BuildOptions, Facing, Hit, Instance, Mesh, NONE, OpenError, OwnedAccel,
-    PlainList, PrimId, QueryOptions, Ray, Scene, SphereSet,
+    Accel, BuildOptions, Facing, Hit, Instance, Mesh, NONE, OwnedAccel, PlainList, Precision,
+    PrimId, QueryOptions, Ray, Scene,
 };
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::oracle::Oracle;
 
-const DEFAULT: QueryOptions = QueryOptions {
-    precision: raykern::Precision::Exact,
-    mask: 0,
-    facing: Facing::Both,
-    skip: None,
-};
+const DEFAULT: QueryOptions =
+    QueryOptions { precision: Precision::Exact, mask: 0, facing: Facing::Both, skip: None };
 
 fn point(m: &[f32; 12], p: [f32; 3]) -> [f64; 3] {
     let p = p.map(f64::from);
@@ -173,4 +169,233 @@ fn answers_are_exact_for_the_rounded_rays() {
     println!("{rays} rays, {hits} hits, {wrong} wrong");
     assert!(hits > rays / 3);
     assert_eq!(wrong, 0);
+}
+
+/// Masks on instances and in them, sides, and skipped primitives, also of one instance among several of one accel.
+#[test]
+fn options_reach_into_instances() {
+    const MASKS: [u32; 3] = [1, 0, 2];
+    const INSTANCE_MASKS: [u32; 5] = [0, 1, 2, 3, 1];
+    let model = child_model(5);
+    let child = model.with_masked_scene(&MASKS, |scene| {
+        OwnedAccel::bvh(scene, &BuildOptions::default()).expect("a BVH")
+    });
+    let mut random = Random::new(2);
+    let maps = INSTANCE_MASKS.map(|_| random_map(&mut random, 0));
+    let instances = [0, 1, 2, 3, 4]
+        .map(|i| Instance::new(&child.accel(), maps[i]).with_mask(INSTANCE_MASKS[i]));
+    let all = All::build(&Scene::new(&[], &[]).with_instances(&instances));
+    let judge = Judge {
+        own: Oracle::new(&Model::default()),
+        child: Oracle::with_masks(&model, &MASKS),
+        masks: INSTANCE_MASKS.to_vec(),
+    };
+    let accels = all.accels();
+    let (mut hits, mut skipped) = (0, 0);
+    for _ in 0..2_000 {
+        let to = [0, 1, 2].map(|_| random.between(-0.8, 0.8) as f32);
+        let to = point(&maps[random.below(5)], to);
+        let ray = towards(&mut random, to, 2.0);
+        let first = agreed(&accels, &ray, &DEFAULT);
+        let skip =
+            first.map(|Hit { prim, geometry, instance, .. }| PrimId { prim, geometry, instance });
+        let skip = skip.filter(|_| random.below(2) == 0);
+        let facing = [Facing::Both, Facing::Front, Facing::Back][random.below(3)];
+        let options = QueryOptions { mask: random.below(4) as u32, facing, skip, ..DEFAULT };
+        let hit = agreed(&accels, &ray, &options);
+        assert_eq!(named(hit), judge.closest(&accels[0].1, &ray, &options), "{ray:?} {options:?}");
+        hits += u32::from(hit.is_some());
+        skipped += u32::from(skip.is_some());
+    }
+    assert!(hits > 500 && skipped > 300, "{hits} {skipped}");
+}
+
+/// Corners on a lattice: shifts and scales by powers of two are exact, and rays meet several instances at once.
+fn lattice_mesh(random: &mut Random, count: usize) -> TriangleMesh {
+    let vertices =
+        (0..3 * count).map(|_| [0, 1, 2].map(|_| random.below(9) as f32 / 4.0 - 1.0)).collect();
+    let indices = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    TriangleMesh { vertices, indices }
+}
+
+/// Where everything is exact, a scene of instances and the same scene flattened have the same answers, to the bit.
+#[test]
+fn exact_maps_answer_as_the_flattened_scene() {
+    let mut random = Random::new(8);
+    let (mut hits, mut in_instances) = (0, 0);
+    for round in 0..12 {
+        let parts = [lattice_mesh(&mut random, 12), lattice_mesh(&mut random, 7)];
+        let own = lattice_mesh(&mut random, 5);
+        let model = Model { meshes: parts.to_vec(), sphere_sets: vec![] };
+        let built = children(&model);
+        let placed: Vec<_> = (0..6)
+            .map(|_| {
+                let scale = [0.5f32, 1.0, 1.0, 2.0][random.below(4)];
+                (scale, [0, 1, 2].map(|_| random.below(5) as f32 / 2.0 - 1.0))
+            })
+            .collect();
+        let instances: Vec<_> = (placed.iter().enumerate())
+            .map(|(i, (s, [x, y, z]))| {
+                let map = [*s, 0., 0., *x, 0., *s, 0., *y, 0., 0., *s, *z];
+                Instance::new(&built[(i + round) % built.len()].accel(), map)
+            })
+            .collect();
+        let mesh = [Mesh::indexed(&own.vertices, &own.indices)];
+        let all = All::build(&Scene::new(&mesh, &[]).with_instances(&instances));
+        let mut flat = Model { meshes: vec![own.clone()], sphere_sets: vec![] };
+        for (scale, shift) in &placed {
+            for part in &parts {
+                let mut part = part.clone();
+                for vertex in &mut part.vertices {
+                    *vertex = [0, 1, 2].map(|k| vertex[k] * scale + shift[k]);
+                }
+                flat.meshes.push(part);
+            }
+        }
+        let flat = All::of(&flat);
+        let flat = flat.accels();
+        let accels = all.accels();
+        for _ in 0..400 {
+            let origin = [0, 1, 2].map(|_| random.below(33) as f32 / 4.0 - 4.0);
+            let to = [0, 1, 2].map(|_| random.below(17) as f32 / 4.0 - 2.0);
+            let ray = Ray::new(origin, [0, 1, 2].map(|k| to[k] - origin[k]));
+            let expected = flat[8].1.intersect(&ray).map(|hit| {
+                let (place, geometry) = match hit.geometry.checked_sub(1) {
+                    None => (NONE, 0),
+                    Some(part) => (part / 2, part % 2),
+                };
+                Hit { instance: place, geometry, ..hit }
+            });
+            let hit = agreed(&accels, &ray, &DEFAULT);
+            assert_eq!(bits(hit), bits(expected), "round {round} {ray:?} {hit:?} {expected:?}");
+            hits += u32::from(hit.is_some());
+            in_instances += u32::from(hit.is_some_and(|hit| hit.instance != NONE));
+        }
+    }
+    assert!(hits > 2_000 && in_instances > 1_000, "{hits} {in_instances}");
+}
+
+/// The same accel twice at one place, and mirrored in a plane that both share: the first instance is hit.
+#[test]
+fn ties_go_to_the_first_instance() {
+    let mut mesh = make::plane(50);
+    mesh.vertices.iter_mut().for_each(|v| v[2] = 0.0);
+    let child = Model::from(mesh);
+    let child = child.with_scene(|s| OwnedAccel::bvh(s, &BuildOptions::default()).expect("a BVH"));
+    // Neither rays nor maps are exact, but both instances see the same ray or its mirror image.
+    let map = [0.7, 0.1, 0.2, 0.3, -0.2, 0.9, 0.1, 0.1, 0.3, -0.4, 1.1, 0.2];
+    let mut mirrored = map;
+    (0..3).for_each(|k| mirrored[4 * k + 2] = -mirrored[4 * k + 2]);
+    for pair in [[map, map], [map, mirrored], [mirrored, map]] {
+        let instances = pair.map(|map| Instance::new(&child.accel(), map));
+        let all = All::build(&Scene::new(&[], &[]).with_instances(&instances));
+        let mut random = Random::new(4);
+        let mut hits = 0;
+        for _ in 0..300 {
+            let to = [random.between(-0.2, 1.2) as f32, random.between(-0.2, 1.2) as f32, 0.0];
+            let ray = towards(&mut random, point(&map, to), 3.0);
+            if let Some(hit) = agreed(&all.accels(), &ray, &DEFAULT) {
+                assert_eq!(hit.instance, 0, "{ray:?}");
+                let skip = Some(PrimId { prim: hit.prim, geometry: 0, instance: 0 });
+                let other = agreed(&all.accels(), &ray, &QueryOptions { skip, ..DEFAULT });
+                let other = other.expect("the other instance");
+                assert_eq!((other.t, other.instance), (hit.t, 1), "{ray:?}");
+                hits += 1;
+            }
+        }
+        assert!(hits > 100, "{hits}");
+    }
+}
+
+/// Rays that hit nothing by definition, and rays at the ends of the floats.
+#[test]
+fn hostile_rays_get_the_same_answer_from_all() {
+    let model = child_model(9);
+    let built = children(&model);
+    let mut random = Random::new(6);
+    let maps: Vec<_> = (0..14).map(|i| random_map(&mut random, i % 7)).collect();
+    let instances: Vec<_> = (maps.iter().enumerate())
+        .map(|(i, map)| Instance::new(&built[i % built.len()].accel(), *map))
+        .collect();
+    let all = All::build(&Scene::new(&[], &[]).with_instances(&instances));
+    let judge = Judge {
+        own: Oracle::new(&Model::default()),
+        child: Oracle::new(&model),
+        masks: vec![0; 14],
+    };
+    let accels = all.accels();
+    const ODD: [f32; 14] = [
+        0.0,
+        -0.0,
+        1e-45,
+        -1e-30,
+        1e-18,
+        -1.0,
+        1.0,
+        1e18,
+        -1e30,
+        3e38,
+        f32::INFINITY,
+        -f32::INFINITY,
+        f32::NAN,
+        0.5,
+    ];
+    let mut hits = 0;
+    for round in 0..3_000 {
+        let mut odd = || ODD[random.below(ODD.len())];
+        let mut ray = Ray::new([odd(), odd(), odd()], [odd(), odd(), odd()]);
+        if round % 3 == 0 {
+            // Towards something, by a direction of any length.
+            let length = [1e-40, 1e-25, 1e10, 1e30][random.below(4)];
+            let to = point(&maps[random.below(14)], [0.1, 0.2, 0.3]);
+            ray = towards(&mut random, to, 1.0);
+            ray.direction = ray.direction.map(|x| x * length);
+        } else if round % 3 == 1 {
+            ray = ray.with_limits(odd(), odd());
+        }
+        let hit = agreed(&accels, &ray, &DEFAULT);
+        let finite = ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite());
+        let expected = judge.closest(&accels[0].1, &ray, &DEFAULT).filter(|_| finite);
+        assert_eq!(named(hit), expected, "{ray:?}");
+        hits += u32::from(hit.is_some());
+    }
+    assert!(hits > 100, "{hits}");
+}
+
+/// Nothing that is hit in exact mode is missed, and batches answer as single rays.
+#[test]
+fn other_ways_to_ask_agree() {
+    let model = child_model(4);
+    let built = children(&model);
+    let mut random = Random::new(3);
+    let maps: Vec<_> = (0..20).map(|_| random_map(&mut random, 0)).collect();
+    let instances: Vec<_> = (maps.iter().enumerate())
+        .map(|(i, map)| Instance::new(&built[i % built.len()].accel(), *map))
+        .collect();
+    let all = All::build(&Scene::new(&[], &[]).with_instances(&instances));
+    let rays: Vec<_> = (0..500)
+        .map(|_| {
+            let to = [0, 1, 2].map(|_| random.between(-1.0, 1.0) as f32);
+            let to = point(&maps[random.below(20)], to);
+            towards(&mut random, to, 3.0)
+        })
+        .collect();
+    let tight = QueryOptions { precision: Precision::Watertight, ..DEFAULT };
+    for (name, accel) in all.accels() {
+        let mut batch = vec![Hit::MISS; rays.len()];
+        let mut occluded = vec![false; rays.len()];
+        accel.intersect_batch(&rays, &mut batch);
+        accel.occluded_batch(&rays, &mut occluded);
+        for ((ray, hit), occluded) in rays.iter().zip(batch).zip(occluded) {
+            let single = accel.intersect(ray);
+            assert_eq!(bits(Some(hit)), bits(single.or(Some(Hit::MISS))), "{name} {ray:?}");
+            assert_eq!(occluded, single.is_some(), "{name} {ray:?}");
+            let mut counts = Default::default();
+            let counted = accel.intersect_counted(ray, &DEFAULT, &mut counts);
+            assert_eq!(bits(counted), bits(single), "{name} {ray:?}");
+            let found = accel.intersect_with(ray, &tight);
+            assert_eq!(found.is_some(), accel.occluded_with(ray, &tight), "{name} {ray:?}");
+            assert!(found.is_some() || single.is_none(), "{name} {ray:?}");
+        }
+    }
 }

@@ -15,8 +15,11 @@ use raykern_harness::rays::{Family, RayMaker};
 use std::mem::MaybeUninit;
 
 type Needs = fn(&Scene, &BuildOptions) -> Result<Memory, BuildError>;
-type Build =
-    for<'m> fn(&Scene, &BuildOptions, &'m mut [MaybeUninit<u8>]) -> Result<Accel<'m>, BuildError>;
+type Build = for<'m> fn(
+    &Scene<'_, 'm>,
+    &BuildOptions,
+    &'m mut [MaybeUninit<u8>],
+) -> Result<Accel<'m>, BuildError>;
 
 /// A structure to build, forced.
 #[derive(Clone, Copy)]
@@ -61,7 +64,7 @@ impl Structure {
 
     fn build<'m>(
         &self,
-        scene: &Scene,
+        scene: &Scene<'_, 'm>,
         memory: &'m mut [MaybeUninit<u8>],
     ) -> Result<Accel<'m>, BuildError> {
         (self.build)(scene, &self.options(), memory)

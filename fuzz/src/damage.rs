@@ -5,8 +5,8 @@
 use std::fmt;
 
 use raykern::{
-    Accel, BuildOptions, Facing, GridKind, GridOptions, Hit, NONE, OwnedAccel, PlainList,
-    Precision, PrimId,
+    Accel, BuildOptions, Facing, GridKind, GridOptions, Hit, Instance, NONE, OwnedAccel, PlainList,
+    Precision, PrimId, Scene,
 };
 use raykern::{QueryOptions, Ray};
 use raykern_harness::make;
@@ -52,7 +52,23 @@ pub fn originals() -> Vec<Vec<u8>> {
             .map(|built| built.expect("a structure").accel().block().to_vec())
         })
     };
-    models.iter().flat_map(build).collect()
+    models.iter().flat_map(build).chain(packed()).collect()
+}
+
+/// Blocks that hold others and instances of them.
+fn packed() -> Vec<Vec<u8>> {
+    let children = [make::blob(40, 1).into(), make::spheres(10, 3)].map(|model: Model| {
+        model.with_scene(|scene| OwnedAccel::bvh(scene, &BuildOptions::default()).expect("a BVH"))
+    });
+    let map = |x: f32| [1.0, 0.2, 0.0, x, 0.0, -1.0, 0.3, 0.0, 0.1, 0.0, 2.0, 0.5];
+    let instances = [0, 1, 0, 0].map(|i| Instance::new(&children[i].accel(), map(i as f32)));
+    let scene = Scene::new(&[], &[]).with_instances(&instances);
+    let grid = OwnedAccel::grid(&scene, &BuildOptions::default());
+    [OwnedAccel::bvh(&scene, &BuildOptions::default()), grid]
+        .map(|built| {
+            built.expect("a structure").packed().expect("a block").accel().block().to_vec()
+        })
+        .to_vec()
 }
 
 impl Damage {
