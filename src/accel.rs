@@ -177,8 +177,8 @@ impl<'m> Accel<'m> {
         }
     }
 
-    /// The closest hit: of least `t` in real numbers, and of equal ones the first by geometry and
-    /// primitive.
+    /// The closest hit: of least `t` in real numbers, and of equal ones the first by instance, geometry and
+    /// primitive, what is in no instance before all that is.
     ///
     /// Hit or miss, the primitive and the order are those of real arithmetic on the given floats,
     /// and `t` is the nearest float to the real one, for all finite inputs.
@@ -323,8 +323,8 @@ impl<'m> Accel<'m> {
         }
     }
 
-    /// All hits that `options` leaves, in the order of their real `t`; at equal `t` by geometry and
-    /// primitive. Each primitive comes at most once, whatever the structure, and a sphere twice, where
+    /// All hits that `options` leaves, in the order of their real `t`; at equal `t` by instance, geometry and
+    /// primitive. Each primitive of each instance comes at most once, whatever the structure, and a sphere twice, where
     /// the ray enters and where it leaves: also when it only touches.
     ///
     /// Exact whatever precision `options` name, with the promises of [`intersect`](Self::intersect), of
@@ -359,9 +359,13 @@ impl<'m> Accel<'m> {
     /// `skip` of `options` leave; `None` when there is none within `radius`, ends included.
     ///
     /// Distances are computed in `f64` by one order of operations, whatever the structure, and of equal ones the first by
-    /// geometry and primitive wins: list, grid and BVH give the same bits. They are within 2^-46 of the
+    /// instance, geometry and primitive wins: list, grid and BVH give the same bits. They are within 2^-46 of the
     /// distance plus the primitive's longest edge or diameter; so nothing is closer by more than that. `distance` is rounded from
     /// it. `facing` and `precision` are not asked, and `skip` leaves out all of a sphere.
+    ///
+    /// In instances, distances are those of the images of vertices, rounded to `f64`, and of the ellipsoids that spheres become; if a map stretches by at
+    /// most 2^10 times as much along one axis as along another, within 2^-40 of the distance and the longest axis. Each instance is looked at whose box is
+    /// closer than what was found before, so this takes time in proportion to their number.
     ///
     /// Finds nothing within a radius that is negative or NaN, from a point that is not finite, or beyond the largest float.
     pub fn closest_point(

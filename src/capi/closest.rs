@@ -16,8 +16,12 @@ use crate::ray::NONE;
 /// refused: false, and nothing is written.
 ///
 /// Distances are computed in double precision, the same bits from every structure and on every machine,
-/// and of equal ones the first by geometry and primitive wins. They are within 2^-46 of the distance plus the
+/// and of equal ones the first by instance, geometry and primitive wins. They are within 2^-46 of the distance plus the
 /// primitive's longest edge or diameter: nothing is closer by more than that.
+///
+/// In instances they are those of the images of vertices, rounded to double precision, and of the ellipsoids that spheres
+/// become; if a map stretches by at most 2^10 times as much along one axis as along another, within 2^-40 of
+/// the distance and the longest axis. Takes time in proportion to the number of instances.
 ///
 /// Nothing is within a radius that is negative or NaN, from a point that is not finite, or beyond FLT_MAX.
 ///

@@ -12,7 +12,7 @@ use crate::query::{PrimId, QueryOptions};
 use crate::ray::{Hit, Ray};
 
 /// All hits that `query` leaves, null leaves everything, in the order of their real `t`; at equal `t` by
-/// geometry and primitive. Writes the first of them to `hits`, as many as `capacity`, and returns how
+/// instance, geometry and primitive. Writes the first of them to `hits`, as many as `capacity`, and returns how
 /// many: the nearest few.
 ///
 /// With a cursor, which begins as zeros but for its `struct_size`, each call goes on after the last
@@ -20,7 +20,7 @@ use crate::ray::{Hit, Ray};
 /// lost or given twice between two calls for the same accel, ray and query, even where several hits
 /// round to one `t`. `cursor` may be null: each call begins with the first hit.
 ///
-/// Each primitive is given at most once, but a sphere twice: where the ray enters and where it leaves,
+/// Each primitive of each instance is given at most once, but a sphere twice: where the ray enters and where it leaves,
 /// also when it only touches. At a shared edge or vertex all triangles that are met are given. Exact
 /// whatever `query->precision` is, and the first of all is that of `rt_intersect`. What is in `hits`
 /// behind those returned may be written too.

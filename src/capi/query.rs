@@ -13,7 +13,7 @@ use crate::query::{Facing, Precision, PrimId, QueryOptions};
 use crate::ray::{Hit, Ray};
 use crate::surface::Surface;
 
-/// The closest hit: the least `t`, and at equal `t` the first by geometry and primitive.
+/// The closest hit: the least `t`, and at equal `t` the first by instance, geometry and primitive.
 ///
 /// Returns whether there is one, and writes it, or the miss, to `*hit`. When a pointer is null:
 /// false, and nothing is written.

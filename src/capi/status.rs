@@ -17,7 +17,7 @@ pub const RT_ERROR_NULL_POINTER: RtStatus = 1;
 pub const RT_ERROR_INVALID_ARGUMENT: RtStatus = 2;
 /// A struct is larger than this library knows, and the part it does not know is not zero.
 pub const RT_ERROR_VERSION: RtStatus = 3;
-/// The request is part of this header but not yet of the library.
+/// The request is part of this header but not of the library: no call of this version returns it.
 pub const RT_ERROR_UNSUPPORTED: RtStatus = 4;
 /// A triangle names a vertex that its mesh does not have.
 pub const RT_ERROR_INDEX_OUT_OF_RANGE: RtStatus = 5;
@@ -63,7 +63,6 @@ pub(crate) enum Error {
     NullPointer,
     InvalidArgument,
     Version,
-    Unsupported,
     IndexOutOfRange,
     OutOfMemory,
     Misaligned,
@@ -90,7 +89,6 @@ impl Error {
             Error::NullPointer => RT_ERROR_NULL_POINTER,
             Error::InvalidArgument => RT_ERROR_INVALID_ARGUMENT,
             Error::Version => RT_ERROR_VERSION,
-            Error::Unsupported => RT_ERROR_UNSUPPORTED,
             Error::IndexOutOfRange => RT_ERROR_INDEX_OUT_OF_RANGE,
             Error::OutOfMemory => RT_ERROR_OUT_OF_MEMORY,
             Error::Misaligned => RT_ERROR_MISALIGNED,
