@@ -121,7 +121,6 @@ impl<'m, 'h> Question<'m> for HitsAfter<'h> {
     type Query = NextHits<'m, 'h>;
     /// How many, and the root of the last.
     type Answer = (usize, usize);
-    const RARE: bool = true;
 
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
         let filter = Filter::new(self.choice, block.geometries, block.prim_ids);

@@ -55,6 +55,9 @@ pub fn originals() -> Vec<Vec<u8>> {
     models.iter().flat_map(build).collect()
 }
 
+/// More than both roots of everything in these blocks.
+const MOST_HITS: usize = 10_000;
+
 impl Damage {
     /// The block.
     pub fn block(&self, originals: &[Vec<u8>]) -> Vec<u8> {
@@ -90,6 +93,11 @@ impl Damage {
                     accel.intersect_counted(ray, &options, &mut Default::default());
                     if let Some(hit) = hit {
                         accel.surface(ray, &hit);
+                    }
+                    let count = accel.hits(ray, &options).take(MOST_HITS).count();
+                    assert!(count < MOST_HITS, "no end of hits");
+                    for radius in [1.0, f32::INFINITY] {
+                        accel.closest_point(ray.origin, radius, &options);
                     }
                 }
             }

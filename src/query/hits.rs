@@ -2,11 +2,10 @@
 
 use core::cmp::Ordering;
 
-use super::{Decide, Exact, Filter, Meets, Query, SphereLane, TriangleLane};
+use super::{Decide, Exact, ExactMet, Filter, Meets, Query, SphereLane, TriangleLane};
 use crate::block::Block;
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock};
 use crate::math::rounding::{f32_above, f32_below};
-use crate::query::exact::ExactMet;
 use crate::ray::{Hit, PreparedRay};
 
 /// The first hits after one that is known, as many as there is room for, each once.
@@ -139,10 +138,12 @@ impl<'m, 'h> NextHits<'m, 'h> {
         if interval.near > f64::from(kept.u) {
             return Ordering::Greater;
         }
-        let other = self.meet_again(ray, kept);
-        let before =
-            |other| Exact::is_before(ray, met, &other, self.filter.prim_ids, None, &mut ());
-        if other.is_some_and(before) { Ordering::Less } else { Ordering::Greater }
+        // Only in blocks of foreign bytes something is not met again. As what comes before it is not given, lists end.
+        let Some(other) = self.meet_again(ray, kept) else { return Ordering::Less };
+        match Exact::is_before(ray, met, &other, self.filter.prim_ids, None, &mut ()) {
+            true => Ordering::Less,
+            false => Ordering::Greater,
+        }
     }
 
     /// The meeting of which `kept` was kept.
