@@ -29,12 +29,12 @@ pub(crate) struct NextHits<'m, 'h> {
 /// A meeting in the memory of a hit: floats around its real `t`, and where to meet it again.
 ///
 /// ```text
-/// byte 0      4     8   12            16           20                24
-///      | near | far | - | flat number | leaf block | lane bit, root |
+/// byte 0      4     8   12            16           20                      24
+///      | near | far | - | flat number | leaf block | lane bit, root, sure |
 /// ```
 ///
 /// The rest is computed again when two meetings are too close to each other for this, and for the answer.
-fn keep(met: &ExactMet, number: u32) -> Hit {
+fn keep(met: &ExactMet, number: u32, sure: bool) -> Hit {
     let (leaf, interval) = (met.leaf(), met.interval());
     Hit {
         t: f32_below(interval.near),
@@ -42,12 +42,13 @@ fn keep(met: &ExactMet, number: u32) -> Hit {
         v: 0.0,
         prim: number,
         geometry: leaf.block,
-        instance: leaf.lanes | (met.root() as u32) << ROOT,
+        instance: leaf.lanes | (met.root() as u32) << ROOT | u32::from(sure) << SURE,
     }
 }
 
-/// Above the bits of the lanes.
+/// Bits above those of the lanes: the root, and whether the sieve was sure of a triangle.
 const ROOT: u32 = 16;
+const SURE: u32 = 17;
 
 fn root_of(kept: &Hit) -> usize {
     (kept.instance >> ROOT) as usize & 1
@@ -63,7 +64,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
         room: &'h mut [Hit],
     ) -> Self {
         let Block { triangle_blocks, sphere_blocks, .. } = *block;
-        let after = after.map(|met| keep(met, met.place().prim(filter.prim_ids)));
+        let after = after.map(|met| keep(met, met.place().prim(filter.prim_ids), false));
         NextHits {
             filter,
             triangle_blocks,
@@ -90,7 +91,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
         (self.count, root)
     }
 
-    fn consider(&mut self, ray: &PreparedRay, met: &ExactMet) {
+    fn consider(&mut self, ray: &PreparedRay, met: &ExactMet, sure: bool) {
         if !self.filter.faces(met.front()) {
             return;
         }
@@ -109,7 +110,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
                 Err(place) => place,
             },
         };
-        self.insert(ray, place, keep(met, number));
+        self.insert(ray, place, keep(met, number, sure));
     }
 
     /// Puts it there; the last one gives way when there is no room.
@@ -155,7 +156,8 @@ impl<'m, 'h> NextHits<'m, 'h> {
         if leaf.kind() == KIND_TRIANGLES {
             let block = self.triangle_blocks.get(number)?;
             let place = place(block.first);
-            let lane = TriangleLane { block, place, sure: false, inside: false };
+            let sure = kept.instance >> SURE & 1 == 1;
+            let lane = TriangleLane { block, place, sure, inside: false };
             return Exact::triangle(ray, &lane, &mut ());
         }
         let block = self.sphere_blocks.get(number)?;
@@ -175,10 +177,11 @@ impl Query for NextHits<'_, '_> {
     }
 
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        self.filter.fetch(lane.place);
         if self.filter.sees(lane.place, true)
             && let Some(met) = Exact::triangle(ray, lane, &mut ())
         {
-            self.consider(ray, &met);
+            self.consider(ray, &met, lane.sure);
         }
         false
     }
@@ -187,7 +190,7 @@ impl Query for NextHits<'_, '_> {
         if self.filter.sees(lane.place, false) {
             for met in Exact::sphere(ray, lane, &mut ()).iter().flatten() {
                 if self.filter.sees(lane.place, met.skippable()) {
-                    self.consider(ray, met);
+                    self.consider(ray, met, false);
                 }
             }
         }
