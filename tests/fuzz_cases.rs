@@ -15,6 +15,7 @@ mod scenes;
 use case::{Case, Subject};
 use damage::{Damage, originals};
 use raykern::{Facing, NONE, Precision, PrimId, QueryOptions, Ray};
+use raykern_harness::make::Random;
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::rays::{Family, RayMaker};
 
@@ -133,6 +134,27 @@ fn blocks_that_were_found() {
         println!("{name}");
         damage.check(&originals);
     }
+}
+
+/// Words that are damaged at random: a short run without a fuzzer.
+#[test]
+fn blocks_full_of_trouble() {
+    const ODD: [u32; 6] = [0, 1, u32::MAX, 0x7f80_0000, 0x7fc0_0000, 0x8000_0000];
+    let (originals, mut random, mut accepted) = (originals(), Random::new(1), 0);
+    let model = Model { meshes: vec![], sphere_sets: vec![vec![[0.5, 0.5, 0.5, 0.8]]] };
+    for original in 0..3_000 {
+        let mut word = || match random.below(3) {
+            0 => ODD[random.below(ODD.len())],
+            1 => (random.between(-2.0, 2.0) as f32).to_bits(),
+            _ => random.bits() as u32 >> random.below(32),
+        };
+        // Most of what is accepted has its damage behind the header.
+        let words: Vec<_> = (0..2).map(|_| (word() as usize / 4 * 4, word())).collect();
+        let rays = RayMaker::new(&model, original as u64).many(Family::Random, 2);
+        let damage = Damage { original, words, rays, ..Damage::default() };
+        accepted += usize::from(damage.check(&originals));
+    }
+    assert!(accepted > 1_000, "{accepted}");
 }
 
 /// Normals are right for edges of 1e-44 to 1e37, says the header.

@@ -19,6 +19,7 @@ fn fetched(accel: &Accel, ray: &Ray, options: &QueryOptions, capacity: usize) ->
     loop {
         let count = accel.more_hits(ray, options, &mut last, &mut room);
         hits.extend_from_slice(&room[..count]);
+        assert!(hits.len() < 10_000, "{ray:?} goes on without end");
         if count < capacity {
             return hits;
         }

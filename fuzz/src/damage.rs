@@ -71,6 +71,9 @@ fn packed() -> Vec<Vec<u8>> {
         .to_vec()
 }
 
+/// More than both roots of everything in these blocks.
+const MOST_HITS: usize = 10_000;
+
 impl Damage {
     /// The block.
     pub fn block(&self, originals: &[Vec<u8>]) -> Vec<u8> {
@@ -106,6 +109,11 @@ impl Damage {
                     accel.intersect_counted(ray, &options, &mut Default::default());
                     if let Some(hit) = hit {
                         accel.surface(ray, &hit);
+                    }
+                    let count = accel.hits(ray, &options).take(MOST_HITS).count();
+                    assert!(count < MOST_HITS, "no end of hits");
+                    for radius in [1.0, f32::INFINITY] {
+                        accel.closest_point(ray.origin, radius, &options);
                     }
                 }
             }

@@ -48,7 +48,7 @@ fn closer(best: Foot, other: Foot) -> Foot {
 
 /// How far along an edge its closest point lies, from 0 to 1.
 fn along_edge(from_start: DVec3, edge: DVec3) -> f64 {
-    (from_start.dot(edge) / edge.length_squared()).max(0.0).min(1.0)
+    (from_start.dot(edge) / edge.length_squared()).clamp(0.0, 1.0)
 }
 
 /// The closest point of a sphere's surface, with its distance within 2^-46 of the distance and the diameter. For the

@@ -2,11 +2,10 @@
 
 use core::cmp::Ordering;
 
-use super::{Decide, Exact, Filter, Meets, Query, SphereLane, TriangleLane};
+use super::{Decide, Exact, ExactMet, Filter, Meets, Query, SphereLane, TriangleLane};
 use crate::block::Block;
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock};
 use crate::math::rounding::{f32_above, f32_below};
-use crate::query::exact::ExactMet;
 use crate::ray::{Hit, PreparedRay};
 
 /// The first hits after one that is known, as many as there is room for, each once.
@@ -30,12 +29,12 @@ pub(crate) struct NextHits<'m, 'h> {
 /// A meeting in the memory of a hit: floats around its real `t`, and where to meet it again.
 ///
 /// ```text
-/// byte 0      4     8   12            16           20                24
-///      | near | far | - | flat number | leaf block | lane bit, root |
+/// byte 0      4     8   12            16           20                      24
+///      | near | far | - | flat number | leaf block | lane bit, root, sure |
 /// ```
 ///
 /// The rest is computed again when two meetings are too close to each other for this, and for the answer.
-fn keep(met: &ExactMet, number: u32) -> Hit {
+fn keep(met: &ExactMet, number: u32, sure: bool) -> Hit {
     let (leaf, interval) = (met.leaf(), met.interval());
     Hit {
         t: f32_below(interval.near),
@@ -43,12 +42,13 @@ fn keep(met: &ExactMet, number: u32) -> Hit {
         v: 0.0,
         prim: number,
         geometry: leaf.block,
-        instance: leaf.lanes | (met.root() as u32) << ROOT,
+        instance: leaf.lanes | (met.root() as u32) << ROOT | u32::from(sure) << SURE,
     }
 }
 
-/// Above the bits of the lanes.
+/// Bits above those of the lanes: the root, and whether the sieve was sure of a triangle.
 const ROOT: u32 = 16;
+const SURE: u32 = 17;
 
 fn root_of(kept: &Hit) -> usize {
     (kept.instance >> ROOT) as usize & 1
@@ -64,7 +64,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
         room: &'h mut [Hit],
     ) -> Self {
         let Block { triangle_blocks, sphere_blocks, .. } = *block;
-        let after = after.map(|met| keep(met, met.place().prim(filter.prim_ids)));
+        let after = after.map(|met| keep(met, met.place().prim(filter.prim_ids), false));
         NextHits {
             filter,
             triangle_blocks,
@@ -86,7 +86,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
         self.count
     }
 
-    fn consider(&mut self, ray: &PreparedRay, met: &ExactMet) {
+    fn consider(&mut self, ray: &PreparedRay, met: &ExactMet, sure: bool) {
         if !self.filter.faces(met.front()) {
             return;
         }
@@ -105,7 +105,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
                 Err(place) => place,
             },
         };
-        self.insert(ray, place, keep(met, number));
+        self.insert(ray, place, keep(met, number, sure));
     }
 
     /// Puts it there; the last one gives way when there is no room.
@@ -134,10 +134,12 @@ impl<'m, 'h> NextHits<'m, 'h> {
         if interval.near > f64::from(kept.u) {
             return Ordering::Greater;
         }
-        let other = self.meet_again(ray, kept);
-        let before =
-            |other| Exact::is_before(ray, met, &other, self.filter.prim_ids, None, &mut ());
-        if other.is_some_and(before) { Ordering::Less } else { Ordering::Greater }
+        // Only in blocks of foreign bytes something is not met again. As what comes before it is not given, lists end.
+        let Some(other) = self.meet_again(ray, kept) else { return Ordering::Less };
+        match Exact::is_before(ray, met, &other, self.filter.prim_ids, None, &mut ()) {
+            true => Ordering::Less,
+            false => Ordering::Greater,
+        }
     }
 
     /// The meeting of which `kept` was kept.
@@ -149,7 +151,8 @@ impl<'m, 'h> NextHits<'m, 'h> {
         if leaf.kind() == KIND_TRIANGLES {
             let block = self.triangle_blocks.get(number)?;
             let place = place(block.first);
-            let lane = TriangleLane { block, place, sure: false, inside: false };
+            let sure = kept.instance >> SURE & 1 == 1;
+            let lane = TriangleLane { block, place, sure, inside: false };
             return Exact::triangle(ray, &lane, &mut ());
         }
         let block = self.sphere_blocks.get(number)?;
@@ -169,10 +172,11 @@ impl Query for NextHits<'_, '_> {
     }
 
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        self.filter.fetch(lane.place);
         if self.filter.sees(lane.place, true)
             && let Some(met) = Exact::triangle(ray, lane, &mut ())
         {
-            self.consider(ray, &met);
+            self.consider(ray, &met, lane.sure);
         }
         false
     }
@@ -181,7 +185,7 @@ impl Query for NextHits<'_, '_> {
         if self.filter.sees(lane.place, false) {
             for met in Exact::sphere(ray, lane, &mut ()).iter().flatten() {
                 if self.filter.sees(lane.place, met.skippable()) {
-                    self.consider(ray, met);
+                    self.consider(ray, met, false);
                 }
             }
         }
