@@ -150,14 +150,8 @@ struct HitsAfter<'h> {
 
 impl<'m, 'h> Question<'m> for HitsAfter<'h> {
     type Query = NextHits<'m, 'h>;
-<<<<<<< HEAD:src/hits/mod.rs
     /// How many.
     type Answer = usize;
-    const RARE: bool = true;
-=======
-    /// How many, and the root of the last.
-    type Answer = (usize, usize);
->>>>>>> asks:src/hits.rs
 
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
         let filter = Filter::new(self.choice, block.geometries, block.prim_ids);
