@@ -1,49 +1,27 @@
 //! The face of a built structure.
 
+mod info;
+mod sound;
+mod spot;
+
 use crate::batch;
-use crate::block::cells::resolution;
 use crate::block::level::Level;
-use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID, KIND_LIST, Motion};
-use crate::bvh;
+use crate::block::{Block, Finished};
 use crate::closest::{self, PointHit};
 use crate::error::OpenError;
-use crate::grid;
 use crate::hits::{self, HitKey, Hits};
 use crate::levels;
-use crate::prim::{self, Leaves};
-use crate::query::{
-    Choice, Counts, Decide, Exact, Meets, Precision, PrimId, QueryOptions, Wanted, Watch,
-    Watertight, flat_number,
-};
+use crate::query::{Choice, Counts, Exact, Precision, QueryOptions, Watch, Watertight};
 use crate::ray::{Hit, NONE, Ray};
 use crate::scene::Instance;
 use crate::storage::ALIGNMENT;
-use crate::surface::{Spot, Surface};
-use crate::trace::{self, AnyHit, ClosestHit, LocateHit};
+use crate::surface::Surface;
+use crate::trace::{self, AnyHit, ClosestHit};
 
-/// What a block holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Leaf blocks alone.
-    List,
-    /// A regular grid.
-    Grid,
-    /// A bounding volume hierarchy.
-    Bvh,
-}
-
-/// How the nodes of a BVH lie in memory.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Layout {
-    /// [`Wide(16)`](Self::Wide): the fastest on most machines. The block says how it is read, not
-    /// the machine.
-    #[default]
-    Automatic,
-    /// Binary nodes of 32 bytes: the least memory, and the least stack.
-    Compact,
-    /// Bundles of 4, 8 or 16 boxes, over leaves of a whole block each.
-    Wide(u32),
-}
+use info::info_of;
+pub use info::{Info, Kind, Layout};
+use sound::{block_is_sound, level_is_sound};
+use spot::spot_of;
 
 impl<'c> Instance<'c> {
     /// What is in `accel`, mapped from its object space to the world by three rows of four, the last column the shift:
@@ -53,40 +31,6 @@ impl<'c> Instance<'c> {
     pub fn new(accel: &Accel<'c>, object_to_world: [f32; 12]) -> Self {
         Instance { child: accel.0, object_to_world, mask: 0 }
     }
-}
-
-/// What a block holds, in numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Info {
-    /// The structure: that over the instances, if there are any.
-    pub kind: Kind,
-    /// How its nodes lie in memory; compact where there are none.
-    pub layout: Layout,
-    /// Lower corner of the box around everything that can be hit, instances included.
-    pub lower: [f32; 3],
-    /// Upper corner; below `lower` when nothing can be hit.
-    pub upper: [f32; 3],
-    /// Triangles that can be hit.
-    pub triangle_count: u32,
-    /// Spheres that can be hit.
-    pub sphere_count: u32,
-    /// Instances, which are not counted by what is in them.
-    pub instance_count: u32,
-    /// Triangles without area, spheres without radius, and whatever is not finite.
-    pub ignored_count: u32,
-    /// Cells along each axis of a grid, of the outermost one if they are nested; zero otherwise.
-    pub resolution: [u32; 3],
-    /// The bytes of the whole block.
-    pub size: usize,
-    /// Bytes of nodes (BVH), or of cell words and runs (grid); those over instances included.
-    pub structure_size: usize,
-    /// Bytes of leaf blocks, the primitives themselves, and of instances.
-    pub leaf_size: usize,
-    /// Bytes of primitive ids.
-    pub id_size: usize,
-    /// What a ray costs by the surface area heuristic, over that when the block was built; `None` if the block cannot be
-    /// refitted. From about 2 on a new build is likely to pay.
-    pub cost_growth: Option<f32>,
 }
 
 /// A built structure: a view of one block in the caller's memory.
@@ -397,108 +341,4 @@ impl<'m> Accel<'m> {
         let Block { header, geometries, .. } = self.0.parts();
         Choice::new(options, NONE, geometries, header.prim_limit)
     }
-}
-
-/// Whether what is not in instances can be traversed.
-fn block_is_sound(block: &Block) -> bool {
-    let Block { header, geometries, grids, nodes, bundles, words, runs, .. } = *block;
-    let leaves = Leaves::of(block);
-    let no_grid = grids.is_empty() && words.is_empty() && runs.is_empty();
-    let no_nodes = nodes.is_empty();
-    let no_motion = header.counts.motions == 0;
-    let structure = match (header.kind, bundles) {
-        (KIND_LIST, Bundles::None) => no_grid && no_nodes,
-        (KIND_GRID, Bundles::None) => {
-            no_nodes && no_motion && grid::grids_are_sound(grids, words, runs, &leaves)
-        }
-        (KIND_BVH, Bundles::None) => no_grid && bvh::tree_is_sound(nodes, &leaves),
-        (KIND_BVH, Bundles::Four(bundles)) => {
-            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
-        }
-        (KIND_BVH, Bundles::Eight(bundles)) => {
-            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
-        }
-        (KIND_BVH, Bundles::Sixteen(bundles)) => {
-            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
-        }
-        _ => false,
-    };
-    let first_sphere =
-        geometries.get(header.mesh_count as usize).map_or(header.prim_limit, |g| g.first);
-    let numbered = header.mesh_count as usize <= geometries.len()
-        && header.triangle_limit == first_sphere
-        && first_sphere <= header.prim_limit;
-    let (triangles, prims) = (header.triangle_limit, header.prim_limit);
-    structure && numbered && prim::leaves_are_sound(&leaves, geometries, triangles, prims)
-}
-
-/// Whether the instances number what there is, their index can be traversed, and the children are there and can be too.
-fn level_is_sound(level: &Level) -> bool {
-    let index = level.index.parts();
-    let count = level.instances.len() as u32;
-    let children = level.head.child_count;
-    block_is_sound(&index)
-        && index.header.triangle_limit == 0
-        && index.header.prim_limit == count
-        && level.instances.iter().all(|instance| instance.child < children)
-        && level.are_packed(|child| block_is_sound(&child.parts()))
-}
-
-/// What a block holds outside instances.
-fn info_of(block: &Block) -> Info {
-    let Block { whole, header, grids, nodes, bundles, words, runs, .. } = *block;
-    Info {
-        kind: match header.kind {
-            KIND_GRID => Kind::Grid,
-            KIND_BVH => Kind::Bvh,
-            _ => Kind::List,
-        },
-        layout: match bundles {
-            Bundles::None => Layout::Compact,
-            _ => Layout::Wide(header.layout),
-        },
-        lower: header.bounds.lower,
-        upper: header.bounds.upper,
-        triangle_count: header.triangle_count,
-        sphere_count: header.sphere_count,
-        instance_count: 0,
-        ignored_count: header.ignored_count,
-        resolution: grids
-            .last()
-            .and_then(|grid| words.get(grid.first_word as usize))
-            .map_or([0; 3], |word| resolution(*word)),
-        size: whole.bytes().len(),
-        structure_size: size_of_val(grids)
-            + size_of_val(nodes)
-            + bundles.size()
-            + size_of_val(words)
-            + size_of_val(runs),
-        leaf_size: size_of_val(block.triangle_blocks) + size_of_val(block.sphere_blocks),
-        id_size: size_of_val(block.prim_ids),
-        cost_growth: whole.motion().map(Motion::growth),
-    }
-}
-
-/// The point of a hit outside instances, in either precision.
-fn spot_of(block: Finished, ray: &Ray, hit: &Hit) -> Option<Spot> {
-    let Hit { prim, geometry, instance, .. } = *hit;
-    let id = PrimId { prim, geometry, instance };
-    let Block { geometries, header, .. } = block.parts();
-    let number = flat_number(&id, geometries, header.prim_limit)?;
-    spot_in::<Exact>(block, ray, number, hit.t)
-        .or_else(|| spot_in::<Watertight>(block, ray, number, hit.t))
-}
-
-/// The point of the hit with this flat number and `t` in one precision.
-fn spot_in<D: Decide>(whole: Finished, ray: &Ray, number: u32, t: f32) -> Option<Spot> {
-    let found =
-        trace::ask(whole, ray, LocateHit::<D>::new(Wanted { prim: number, t, root: None }))?;
-    let line = ray.line();
-    let (block, lane) = (found.place().block as usize, found.place().lane as usize);
-    let Block { header, triangle_blocks, sphere_blocks, .. } = whole.parts();
-    if number < header.triangle_limit {
-        return Some(Spot::on_triangle(&line, triangle_blocks.get(block)?.triangle(lane)));
-    }
-    let (centre, radius) = sphere_blocks.get(block)?.sphere(lane);
-    Some(Spot::on_sphere(&line, centre, radius, found.root()))
 }
