@@ -221,13 +221,13 @@ pub(super) fn overlap(areas: Areas, [a, b]: [&Box4; 2]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::block::BvhNode;
+    use crate::block::{BvhNode, Geometry};
     use crate::bvh::bins::Effort;
     use crate::bvh::branch::grow;
     use crate::bvh::tree::{Grown, Limits};
     use crate::caller::Caller;
-    use crate::prim::Shape;
-    use crate::scene::Mesh;
+    use crate::prim::{Shape, Source};
+    use crate::scene::{Mesh, Scene};
     use std::vec::Vec;
 
     /// Long thin triangles across each other, among many small ones; all coordinates are integers.
@@ -263,7 +263,7 @@ mod tests {
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * count];
         let limits = Limits {
             leaves: count,
-            source: Some(Source { scene: &scene, geometries: &geometries }),
+            source: Some(Source { scene: &scene, geometries: &geometries, named: false }),
             leaf_max: 5,
             mixed: false,
             deep: true,
