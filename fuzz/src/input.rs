@@ -354,7 +354,8 @@ impl Maker<'_, '_> {
     fn copy(&mut self) -> Result<[usize; 3]> {
         let size = [4, 16, 32, 64, 112, 224, 256, 448][self.below(8)?];
         let step = size.min(64);
-        let mut place = || Ok(step * usize::from(self.bytes.arbitrary::<u16>()?));
+        let mut place =
+            || -> Result<usize> { Ok(step * usize::from(self.bytes.arbitrary::<u16>()?)) };
         Ok([place()?, place()?, size])
     }
 
