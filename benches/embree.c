@@ -72,6 +72,20 @@ int bench_embree_mesh(BenchEmbree *e, const float *vertices, size_t vertex_count
     return rtcGetDeviceError(e->device) != RTC_ERROR_NONE;
 }
 
+void bench_embree_moving(BenchEmbree *e, int refit)
+{
+    e->quality = refit ? RTC_BUILD_QUALITY_REFIT : RTC_BUILD_QUALITY_LOW;
+    rtcSetSceneFlags(e->scene, RTC_SCENE_FLAG_DYNAMIC);
+}
+
+void bench_embree_move(BenchEmbree *e, const float *vertices, size_t vertex_count)
+{
+    RTCGeometry mesh = rtcGetGeometry(e->scene, 0);
+    memcpy(rtcGetGeometryBufferData(mesh, RTC_BUFFER_TYPE_VERTEX, 0), vertices, 12 * vertex_count);
+    rtcUpdateGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0);
+    rtcCommitGeometry(mesh);
+}
+
 int bench_embree_commit(BenchEmbree *e)
 {
     rtcCommitScene(e->scene);

@@ -22,6 +22,10 @@ BenchEmbree *bench_embree_new(const char *config, int quality, int robust);
 /* Copies a mesh into buffers of Embree's own, padded as its loads need. */
 int bench_embree_mesh(BenchEmbree *, const float *vertices, size_t vertex_count,
                       const uint32_t *indices, size_t triangle_count);
+/* Before the mesh: it will move, and is followed by refitting or by building anew. */
+void bench_embree_moving(BenchEmbree *, int refit);
+/* Copies other places for the vertices of the first mesh. */
+void bench_embree_move(BenchEmbree *, const float *vertices, size_t vertex_count);
 /* The build. Zero on success. */
 int bench_embree_commit(BenchEmbree *);
 /* Bytes that the device has allocated, the copied meshes included. */

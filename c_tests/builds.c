@@ -5,13 +5,13 @@
 #include <fenv.h>
 #include <pthread.h>
 
-#define WORKERS 3
+#define WORKERS 8
 
 // A build's tasks, and who takes the next one.
 typedef struct Crew {
     RtTask task;
     void *context;
-    uint32_t count, next, ran;
+    uint32_t workers, count, next, ran;
     pthread_mutex_t lock;
 } Crew;
 
@@ -38,8 +38,8 @@ static void parallel_for(void *user, uint32_t count, RtTask task, void *context)
     crew->next = 0;
     crew->ran += count;
     pthread_t threads[WORKERS];
-    for (int i = 0; i < WORKERS; i++) CHECK(pthread_create(&threads[i], NULL, work, crew) == 0);
-    for (int i = 0; i < WORKERS; i++) CHECK(pthread_join(threads[i], NULL) == 0);
+    for (uint32_t i = 0; i < crew->workers; i++) CHECK(pthread_create(&threads[i], NULL, work, crew) == 0);
+    for (uint32_t i = 0; i < crew->workers; i++) CHECK(pthread_join(threads[i], NULL) == 0);
 }
 
 static uint32_t calls, allowed;
@@ -108,10 +108,11 @@ int main(void) {
     check_choice(&scene);
     const uint32_t qualities[3] = {RT_QUALITY_FAST, RT_QUALITY_BALANCED, RT_QUALITY_BEST};
     Crew crew = {.lock = PTHREAD_MUTEX_INITIALIZER};
-    for (int i = 0; i < 3; i++) {
+    for (int i = 0; i < 6; i++) {
         RtBuildOptions options = {0};
         options.struct_size = sizeof options;
-        options.quality = qualities[i];
+        options.quality = qualities[i / 2];
+        options.refit = i % 2;
         const RtAccel *alone = built(&scene, false, &options);
         options.user = &crew;
         options.parallel_for = parallel_for;
@@ -119,11 +120,15 @@ int main(void) {
         crew.ran = 0;
         built(&scene, false, &options);
         CHECK(crew.ran == 0);
-        options.worker_count = WORKERS;
-        const RtAccel *together = built(&scene, false, &options);
-        CHECK(crew.ran > 4);
-        CHECK(rt_accel_size(alone) == rt_accel_size(together));
-        CHECK(memcmp(alone, together, rt_accel_size(alone)) == 0);
+        for (crew.workers = 2; crew.workers <= WORKERS; crew.workers += 3) {
+            options.worker_count = crew.workers;
+            crew.ran = 0;
+            const RtAccel *together = built(&scene, false, &options);
+            CHECK(crew.ran > 4);
+            CHECK(rt_accel_size(alone) == rt_accel_size(together));
+            CHECK(memcmp(alone, together, rt_accel_size(alone)) == 0);
+        }
+        crew.workers = options.worker_count = 3;
 
         // Cancelled at each call, in the same memory, which then takes a build.
         options.progress = progress;

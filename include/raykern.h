@@ -623,7 +623,7 @@ RT_RAYKERN_ASSERT(size_of_point_hit, sizeof(RtPointHit) == 36);
 RT_RAYKERN_ASSERT(size_of_memory, sizeof(RtMemory) == 3 * sizeof(size_t));
 RT_RAYKERN_ASSERT(size_of_surface, sizeof(RtSurface) == 56);
 RT_RAYKERN_ASSERT(surface_normal, offsetof(RtSurface, normal) == 20);
-RT_RAYKERN_ASSERT(size_of_info, sizeof(RtInfo) == 4 * sizeof(size_t) + 64);
+RT_RAYKERN_ASSERT(size_of_info, sizeof(RtInfo) == 4 * sizeof(size_t) + 72);
 RT_RAYKERN_ASSERT(info_size, offsetof(RtInfo, size) == 64);
 
 #undef RT_RAYKERN_ASSERT

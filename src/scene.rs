@@ -114,6 +114,14 @@ impl<'a> Mesh<'a> {
         indices.words.get(i.wrapping_mul(indices.stride))
     }
 
+    /// The first word of each vertex of triangle `i`, if it has them all.
+    #[inline]
+    pub(crate) fn first_words(&self, i: usize) -> Option<[&'a f32; 3]> {
+        let word = |v: usize| self.vertices.words.get(v.wrapping_mul(self.vertices.stride));
+        let [a, b, c] = self.numbers(i)?;
+        Some([word(a)?, word(b)?, word(c)?])
+    }
+
     /// The vertices of triangle `i`, or `None` when it or one of its vertices does not exist.
     #[inline]
     pub fn triangle(&self, i: usize) -> Option<[[f32; 3]; 3]> {
@@ -122,10 +130,12 @@ impl<'a> Mesh<'a> {
         Some([corner(a)?, corner(b)?, corner(c)?])
     }
 
-    /// The numbers of the vertices of triangle `i`, which need not exist.
+    /// The numbers of the vertices of triangle `i`, which need not exist. There may be more indices or vertices than
+    /// triangles use.
     #[inline]
     pub(crate) fn numbers(&self, i: usize) -> Option<[usize; 3]> {
         match &self.indices {
+            _ if i >= self.triangle_count => None,
             Some(indices) => Some(indices.get::<3>(i)?.map(|v| v as usize)),
             None => Some([3 * i, 3 * i + 1, 3 * i + 2]),
         }

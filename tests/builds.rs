@@ -92,14 +92,24 @@ fn the_number_of_threads_changes_no_byte() {
 #[cfg(feature = "parallel")]
 fn rayon_lends_its_threads() {
     let model: Model = make::blob(50_000, 1).into();
-    let alone = options(Quality::Balanced, Layout::Automatic);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("threads");
-    let many = BuildOptions { threads: Some(&raykern::Rayon), ..alone };
-    assert!(block(&model, &alone) == block(&model, &many));
-    assert!(
-        pool.install(|| block(&model, &options(Quality::Balanced, Layout::Automatic)))
-            == block(&model, &alone)
-    );
+    for (quality, refit) in QUALITIES.into_iter().flat_map(|q| [(q, false), (q, true)]) {
+        let alone = BuildOptions { refit, ..options(quality, Layout::Automatic) };
+        let many = BuildOptions { threads: Some(&raykern::Rayon), ..alone };
+        let expected = block(&model, &alone);
+        assert!(expected == block(&model, &many), "{quality:?}");
+        for count in [1, 2, 5] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("threads");
+            // The threads are those of the pool that the build runs in.
+            pool.install(|| {
+                let many = BuildOptions {
+                    refit,
+                    threads: Some(&raykern::Rayon),
+                    ..options(quality, Layout::Automatic)
+                };
+                assert!(expected == block(&model, &many), "{quality:?} {count}");
+            });
+        }
+    }
 }
 
 #[test]

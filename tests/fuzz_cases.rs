@@ -127,6 +127,37 @@ fn scenes_that_were_found() {
     }
 }
 
+/// Damage as a fuzzer may begin with it: words and records in wrong places.
+#[test]
+fn blocks_that_are_damaged_at_random() {
+    const RECORDS: [usize; 8] = [4, 16, 32, 64, 112, 224, 256, 448];
+    let originals = originals();
+    let mut random = Random::new(3);
+    let rays = vec![Ray::new([0.3, 0.4, 5.0], [-0.0, 0.0, -1.0]), Ray::new([0.1; 3], [1.0; 3])];
+    let mut accepted = 0;
+    for i in 0..4_000 {
+        let mut damage = Damage { original: i, rays: rays.clone(), ..Damage::default() };
+        for _ in 0..random.below(3) {
+            let reach = if random.below(3) == 0 { 64 } else { 1 << 14 };
+            let at = 4 * random.below(reach);
+            let word = match random.below(4) {
+                0 => random.below(8) as u32,
+                1 => f32::NAN.to_bits(),
+                2 => u32::MAX,
+                _ => random.bits() as u32 >> random.below(32),
+            };
+            damage.words.push((at, word));
+        }
+        for _ in 0..random.below(3) {
+            let size = RECORDS[random.below(RECORDS.len())];
+            let mut place = || size.min(64) * random.below(1 << 14);
+            damage.copies.push([place(), place(), size]);
+        }
+        accepted += usize::from(damage.check(&originals));
+    }
+    assert!((400..3_600).contains(&accepted), "{accepted} of 4000 were accepted");
+}
+
 #[test]
 fn blocks_that_were_found() {
     let originals = originals();

@@ -9,7 +9,7 @@ mod motion;
 use common::{bits, choose_backend, odd_models};
 use raykern::{
     Accel, AccelMut, BuildOptions, Hit, Info, Layout, Mesh, OwnedAccel, PlainList, Quality,
-    QueryOptions, Ray, RefitError, Scene, Threads, bvh_needs,
+    QueryOptions, Ray, RefitError, Scene, Strided, Threads, bvh_needs,
 };
 use raykern_harness::make;
 use raykern_harness::model::Model;
@@ -232,6 +232,35 @@ fn vertices_are_the_same_by_their_numbers_alone() {
     }
 }
 
+/// Meshes that do not use all of their arrays, before others.
+#[test]
+fn spare_indices_and_vertices_belong_to_nothing() {
+    let plane = make::plane(200);
+    let vertices = Strided::new(plane.vertices.as_flattened(), 3, 3, plane.vertices.len());
+    let indices = Strided::new(plane.indices.as_flattened(), 3, 3, plane.indices.len());
+    let (vertices, indices) = (vertices.expect("vertices"), indices.expect("indices"));
+    let blob = make::blob(200, 1);
+    let meshes = [
+        Mesh::strided(vertices, Some(indices), 20),
+        Mesh::indexed(&blob.vertices, &blob.indices),
+        Mesh::strided(vertices, None, 5),
+        Mesh::indexed(&blob.vertices, &blob.indices),
+    ];
+    let scene = Scene::new(&meshes, &[]);
+    let list = BuildOptions { plain_list: PlainList::Always, ..Default::default() };
+    let list = OwnedAccel::bvh(&scene, &list).expect("a list");
+    let rays = rays(&blob.clone().into(), 40);
+    let expected = answers(&list.accel(), &rays);
+    for (kind, options) in all_options() {
+        let mut built = OwnedAccel::bvh(&scene, &options).expect("a structure");
+        built.refit(&scene, None).expect("the same meshes");
+        assert!(answers(&built.accel(), &rays) == expected, "{kind}");
+        let plain = BuildOptions { refit: false, ..options };
+        let plain = OwnedAccel::bvh(&scene, &plain).expect("a structure");
+        assert!(answers(&plain.accel(), &rays) == expected, "{kind}, not to be refitted");
+    }
+}
+
 #[test]
 fn masks_are_those_of_the_moved_scene() {
     let mut model: Model = make::blob(300, 1).into();
@@ -254,7 +283,6 @@ fn masks_are_those_of_the_moved_scene() {
     }
 }
 
-/// A vertex that is used once, by what cannot be hit, and that two triangles share.
 #[test]
 fn costs_grow_with_disorder() {
     let model: Model = make::sphere(5000).into();

@@ -7,6 +7,7 @@ use raykern::{Hit, Ray};
 use raykern_harness::model::Model;
 
 use crate::lineup::{Class, Lineup, Tracer};
+use crate::motion::Follower;
 use crate::options::Options;
 use crate::watch::{Watch, timed_build};
 
@@ -26,6 +27,8 @@ unsafe extern "C" {
         indices: *const u32,
         triangle_count: usize,
     ) -> c_int;
+    fn bench_embree_moving(scene: *mut RawScene, refit: c_int);
+    fn bench_embree_move(scene: *mut RawScene, vertices: *const f32, vertex_count: usize);
     fn bench_embree_commit(scene: *mut RawScene) -> c_int;
     fn bench_embree_bytes(scene: *const RawScene) -> usize;
     fn bench_embree_free(scene: *mut RawScene);
@@ -125,6 +128,37 @@ fn timed_scene(model: &Model, config: &CStr, setup: &Setup) -> (Option<Scene>, f
     (scene, crate::watch::median(&mut commits))
 }
 
+/// Every way to follow one mesh that moves, by name. Like the others, each is timed without the copying of vertices.
+pub fn followers(model: &Model, options: &Options) -> Vec<(String, Box<dyn Follower>)> {
+    let mut followers: Vec<(String, Box<dyn Follower>)> = Vec::new();
+    for (suffix, config) in DEVICES {
+        // `None`: a scene that is not said to move.
+        for (way, refit) in [("refit", Some(true)), ("low", Some(false)), ("low, still", None)] {
+            let name = format!("embree{suffix} {way}");
+            let scene = Scene::followed(model, config, refit).filter(|_| options.wants_peer(&name));
+            followers.extend(scene.map(|scene| (name, Box::new(scene) as Box<dyn Follower>)));
+        }
+    }
+    followers
+}
+
+impl Follower for Scene {
+    fn follow(&mut self, model: &Model, rays: &[Ray], hits: &mut [Hit]) -> [f64; 2] {
+        let vertices = model.meshes[0].vertices.as_flattened();
+        // SAFETY: the scene has one mesh with as many vertices.
+        unsafe { bench_embree_move(self.0, vertices.as_ptr(), vertices.len() / 3) };
+        let mut watch = Watch::new();
+        watch.time(|| self.commit());
+        let update = watch.take().seconds;
+        let count = rays.len().min(hits.len());
+        // SAFETY: both slices have that many elements.
+        let trace =
+            || unsafe { bench_embree_closest(self.0, rays.as_ptr(), hits.as_mut_ptr(), count) };
+        watch.time(trace);
+        [update, watch.take().seconds]
+    }
+}
+
 /// A device and a scene on it.
 struct Scene(*mut RawScene);
 
@@ -132,14 +166,30 @@ impl Scene {
     fn new(model: &Model, config: &CStr, setup: &Setup) -> Option<Self> {
         // SAFETY: the string ends with a zero.
         let raw = unsafe { bench_embree_new(config.as_ptr(), setup.quality, setup.robust.into()) };
+        (!raw.is_null()).then_some(Scene(raw))?.with_meshes(model)
+    }
+
+    /// For a model that moves.
+    fn followed(model: &Model, config: &CStr, refit: Option<bool>) -> Option<Self> {
+        // SAFETY: the string ends with a zero.
+        let raw = unsafe { bench_embree_new(config.as_ptr(), 0, 0) };
         let scene = (!raw.is_null()).then_some(Scene(raw))?;
+        if let Some(refit) = refit {
+            // SAFETY: the scene exists.
+            unsafe { bench_embree_moving(scene.0, refit.into()) };
+        }
+        let scene = scene.with_meshes(model)?;
+        (!scene.commit()).then_some(scene)
+    }
+
+    fn with_meshes(self, model: &Model) -> Option<Self> {
         for mesh in &model.meshes {
             let vertices = mesh.vertices.as_flattened();
             let indices = mesh.indices.as_flattened();
             // SAFETY: the counts are those of the slices, and every index names a vertex.
             let failed = unsafe {
                 bench_embree_mesh(
-                    scene.0,
+                    self.0,
                     vertices.as_ptr(),
                     vertices.len() / 3,
                     indices.as_ptr(),
@@ -150,7 +200,7 @@ impl Scene {
                 return None;
             }
         }
-        Some(scene)
+        Some(self)
     }
 
     /// Whether it failed.

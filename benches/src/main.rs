@@ -9,6 +9,7 @@ mod check;
 mod embree;
 mod lineup;
 mod measure;
+mod motion;
 mod options;
 mod ours;
 #[cfg(feature = "peers")]
@@ -30,6 +31,9 @@ fn main() -> Result<()> {
     report::machine(watch::stay_on(options.core), &options);
     if let Some(backend) = options.backend {
         println!("ours with {:?}", backend.force());
+    }
+    if options.motion {
+        return motion::run(&options);
     }
     let mut watch = Watch::new();
     if !watch.counts_events() {

@@ -41,6 +41,9 @@ pub struct Options {
     /// Instead of scenes: spheres of a thousand to ten million triangles.
     #[arg(long)]
     pub growth: bool,
+    /// Instead of still scenes: some that move, what a frame costs by refitting or building anew, and rays after it.
+    #[arg(long)]
+    pub motion: bool,
     /// The folder of scene files; else RAYKERN_SCENES, else shared/scenes beside the workspace.
     #[arg(long, value_name = "DIR")]
     pub folder: Option<PathBuf>,

@@ -20,17 +20,10 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) -> Result<()>
             Layout::Automatic => "bvh".to_string(),
             _ => format!("bvh-{name}"),
         };
-        match timed_build(|| bvh(model, layout)) {
-            (Ok(accel), seconds) => {
-                lineup.built(&name, seconds, Some(accel.accel().block().len()));
-                add_bvh(lineup, &name, &Rc::new(accel));
-            }
-            (Err(BuildError::Unsupported(_)), _) => {
-                lineup.notes.push(format!("{name}: not in this version"));
-                continue;
-            }
-            (Err(error), _) => return Err(error).context(name),
-        }
+        let (accel, seconds) = timed_build(|| bvh(model, layout));
+        let accel = accel.with_context(|| name.clone())?;
+        lineup.built(&name, seconds, Some(accel.accel().block().len()));
+        add_bvh(lineup, &name, &Rc::new(accel));
         for (quality, suffix, class) in
             [(Quality::Fast, "fast", Class::Fast), (Quality::Best, "best", Class::Best)]
         {

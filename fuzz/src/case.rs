@@ -45,6 +45,11 @@ impl Bytes {
     pub fn get(&self) -> &[u8] {
         &self.memory[self.start..self.start + self.len]
     }
+
+    /// The copy, to write to.
+    pub fn get_mut(&mut self) -> &mut [u8] {
+        &mut self.memory[self.start..self.start + self.len]
+    }
 }
 
 /// A scene, built in every way, with its oracle.

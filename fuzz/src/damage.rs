@@ -5,8 +5,8 @@
 use std::fmt;
 
 use raykern::{
-    Accel, BuildOptions, Facing, GridKind, GridOptions, Hit, Instance, NONE, OwnedAccel, PlainList,
-    Precision, PrimId, Scene,
+    Accel, AccelMut, BuildOptions, Facing, GridKind, GridOptions, Hit, Instance, Layout, NONE,
+    OwnedAccel, PlainList, Precision, PrimId, Scene,
 };
 use raykern::{QueryOptions, Ray};
 use raykern_harness::make;
@@ -21,14 +21,16 @@ pub struct Damage {
     pub original: usize,
     /// Bytes from which on, and what stands there instead; modulo the size of the block.
     pub words: Vec<(usize, u32)>,
+    /// Bytes from which on, where a copy of them goes, and how many: modulo the size of the block. Done before the words.
+    pub copies: Vec<[usize; 3]>,
     /// If there are any, the block instead of an original.
     pub bytes: Vec<u8>,
     /// What is asked.
     pub rays: Vec<Ray>,
 }
 
-/// Sound blocks: list, grid and BVH over a few scenes.
-pub fn originals() -> Vec<Vec<u8>> {
+/// What the sound blocks are over.
+fn models() -> [Model; 5] {
     let mut mixed = make::spheres(20, 2);
     mixed.meshes.push(make::soup(40, 2));
     let clustered = {
@@ -37,22 +39,31 @@ pub fn originals() -> Vec<Vec<u8>> {
         model
     };
     let empty = Model { meshes: vec![TriangleMesh::default()], sphere_sets: vec![] };
-    let models = [empty, make::plane(1).into(), make::spheres(40, 3), mixed, clustered];
+    [empty, make::plane(1).into(), make::spheres(40, 3), mixed, clustered]
+}
+
+/// Sound blocks: list, grid and BVH over a few scenes, some of which can be refitted.
+pub fn originals() -> Vec<Vec<u8>> {
     let with = |plain_list| BuildOptions { plain_list, ..Default::default() };
     let build = |model: &Model| {
         model.with_scene(|scene| {
             let never = with(PlainList::Never);
             let octree = GridOptions { kind: GridKind::Octree, ..GridOptions::default() };
+            let refit = BuildOptions { refit: true, ..never };
             [
                 OwnedAccel::bvh(scene, &with(PlainList::Always)),
                 OwnedAccel::grid(scene, &never),
                 OwnedAccel::grid(scene, &BuildOptions { grid: octree, ..never }),
                 OwnedAccel::bvh(scene, &never),
+                OwnedAccel::bvh(scene, &refit),
+                OwnedAccel::bvh(scene, &BuildOptions { layout: Layout::Compact, ..refit }),
+                OwnedAccel::bvh(scene, &BuildOptions { layout: Layout::Wide(4), ..refit }),
+                OwnedAccel::bvh(scene, &BuildOptions { plain_list: PlainList::Always, ..refit }),
             ]
             .map(|built| built.expect("a structure").accel().block().to_vec())
         })
     };
-    models.iter().flat_map(build).chain(packed()).collect()
+    models().iter().flat_map(build).chain(packed()).collect()
 }
 
 /// Blocks that hold others and instances of them.
@@ -81,6 +92,11 @@ impl Damage {
             return self.bytes.clone();
         }
         let mut block = originals[self.original % originals.len()].clone();
+        let size = block.len();
+        for [from, to, count] in self.copies.iter().map(|copy| copy.map(|place| place % size)) {
+            let count = count.min(size - from).min(size - to);
+            block.copy_within(from..from + count, to);
+        }
         for &(at, word) in &self.words {
             let at = at % block.len();
             for (byte, new) in block[at..].iter_mut().zip(word.to_le_bytes()) {
@@ -94,10 +110,25 @@ impl Damage {
     ///
     /// Answers may be nonsense. They come, they name what the block has, and nothing panics.
     pub fn check(&self, originals: &[Vec<u8>]) -> bool {
-        let bytes = Bytes::copy(&self.block(originals));
+        let mut bytes = Bytes::copy(&self.block(originals));
         let Ok(accel) = Accel::open(bytes.get()) else { return false };
+        self.ask(&accel);
+        // Whatever was accepted may be refitted, or not; and is accepted again.
+        for model in models() {
+            let Ok(mut accel) = AccelMut::open(bytes.get_mut()) else { panic!("refused again") };
+            if model.with_scene(|scene| accel.refit(scene, None)).is_ok() {
+                drop(accel);
+                let accel = Accel::open(bytes.get()).expect("as sound as before");
+                self.ask(&accel);
+            }
+        }
+        true
+    }
+
+    /// Asks everything.
+    fn ask(&self, accel: &Accel) {
         let info = accel.info();
-        assert!(info.size <= bytes.get().len() && accel.block().len() == info.size);
+        assert!(accel.block().len() == info.size);
         let id = PrimId { prim: 0, geometry: 0, instance: NONE };
         for precision in [Precision::Exact, Precision::Watertight] {
             let all = QueryOptions { precision, ..Default::default() };
@@ -129,18 +160,18 @@ impl Damage {
                 }
             }
         }
-        true
     }
 }
 
 /// The damage as an element of the table in `tests/fuzz_cases.rs`.
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Damage { original, words, bytes, rays } = self;
+        let Damage { original, words, copies, bytes, rays } = self;
         let rays = format!("{rays:?}").replace("inf", "f32::INFINITY").replace("NaN", "f32::NAN");
         writeln!(f, "Damage {{")?;
         writeln!(f, "    original: {original},")?;
         writeln!(f, "    words: vec!{words:?},")?;
+        writeln!(f, "    copies: vec!{copies:?},")?;
         writeln!(f, "    bytes: vec!{bytes:?},")?;
         writeln!(f, "    rays: vec!{rays},")?;
         writeln!(f, "}}")

@@ -340,11 +340,25 @@ impl Damage {
             let word = maker.word()?;
             damage.words.push(word);
         }
+        for _ in 0..maker.below(3)? {
+            let copy = maker.copy()?;
+            damage.copies.push(copy);
+        }
         Ok(damage)
     }
 }
 
 impl Maker<'_, '_> {
+    /// A copy of as many bytes as a word, a node, a bundle or a leaf block has, or a line of them, to a place where one
+    /// may be.
+    fn copy(&mut self) -> Result<[usize; 3]> {
+        let size = [4, 16, 32, 64, 112, 224, 256, 448][self.below(8)?];
+        let step = size.min(64);
+        let mut place =
+            || -> Result<usize> { Ok(step * usize::from(self.bytes.arbitrary::<u16>()?)) };
+        Ok([place()?, place()?, size])
+    }
+
     fn word(&mut self) -> Result<(usize, u32)> {
         let kind = self.byte()?;
         let place = usize::from(self.bytes.arbitrary::<u16>()?);

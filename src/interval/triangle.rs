@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::exact::{self, Distance, Line, Meeting};
-use crate::math::rounding::{UNIT, gamma};
+use crate::math::rounding::{UNIT, UNIT32, gamma};
 use crate::math::{sum_abs, wide};
 
 /// Where a ray's line meets a triangle.
@@ -191,7 +191,29 @@ fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> 
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.
+#[inline]
 pub(crate) fn has_area(triangle: [[f32; 3]; 3]) -> bool {
+    surely_has_area(triangle) || has_area_in_doubt(triangle)
+}
+
+/// True only if the triangle has area, and if not then hardly ever: in single precision, without a branch.
+#[inline]
+fn surely_has_area([a, b, c]: [[f32; 3]; 3]) -> bool {
+    // Products that underflow are off by 2^-150 each, which this is far above.
+    const TINY: f32 = f32::MIN_POSITIVE;
+    let (e1, e2): ([f32; 3], [f32; 3]) =
+        (core::array::from_fn(|k| b[k] - a[k]), core::array::from_fn(|k| c[k] - a[k]));
+    let mut sure = false;
+    for (i, j) in [(1, 2), (2, 0), (0, 1)] {
+        let (p, q) = (e1[i] * e2[j], e1[j] * e2[i]);
+        // As below, with the roundings of single precision and half of that again. False where products overflow.
+        sure |= (p - q).abs() > 16.0 * UNIT32 * (p.abs() + q.abs()) + TINY;
+    }
+    sure
+}
+
+#[inline(never)]
+fn has_area_in_doubt(triangle: [[f32; 3]; 3]) -> bool {
     let [a, b, c] = triangle.map(wide);
     let (e1, e2) = (b - a, c - a);
     let surely = |k: usize| {

@@ -242,6 +242,15 @@ impl<'s, 'a> Shapes<'s, 'a> {
         }
     }
 
+    /// Has the vertices of a shape fetched, if it is of the last one's mesh; its indices had better be in the cache.
+    #[inline]
+    pub fn prefetch_vertices(&self, id: u32) {
+        let Some((first, mesh)) = &self.mesh else { return };
+        if let Some(vertices) = mesh.first_words(id.wrapping_sub(*first) as usize) {
+            vertices.into_iter().for_each(prefetch);
+        }
+    }
+
     /// The shape with flat number `id`, whether it can be hit or not.
     #[inline]
     pub fn get(&mut self, id: u32) -> Option<Shape> {

@@ -67,8 +67,12 @@ impl Entries<'_> {
         let count = held.count_ones() as usize;
         block.clear();
         for entry in self.first..self.first.saturating_add(count) {
-            if let Some(id) = self.ids.get(entry.saturating_add(AHEAD)) {
+            // First the indices, then what they name.
+            if let Some(id) = self.ids.get(entry.saturating_add(2 * AHEAD)) {
                 shapes.prefetch(*id);
+            }
+            if let Some(id) = self.ids.get(entry.saturating_add(AHEAD)) {
+                shapes.prefetch_vertices(*id);
             }
             let shape = self.ids.get(entry).and_then(|id| shapes.get(*id)?.sound());
             if let Some(shape) = shape {
