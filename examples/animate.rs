@@ -68,7 +68,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-type Build = fn(&Scene, &BuildOptions) -> Result<OwnedAccel, BuildError>;
+type Build = fn(&Scene<'_, 'static>, &BuildOptions) -> Result<OwnedAccel<'static>, BuildError>;
 
 /// A sea, and a knot above it.
 fn still(triangles: usize) -> Model {

@@ -134,7 +134,10 @@ typedef struct RtSphereSet {
     uint32_t reserved;
 } RtSphereSet;
 
-// A built structure at another place. Unsupported so far.
+// A built structure at another place: any map that has an inverse, mirroring, uneven scaling and shear included.
+//
+// The built scene refers to `accel`, which must stay where it is as long as that is used, unless `rt_accel_pack` makes
+// one block of both. `accel` has no instances itself.
 typedef struct RtInstance {
     const RtAccel *accel;
     // Three rows of four; the last column is the shift.
@@ -274,7 +277,7 @@ typedef struct RtHit {
     uint32_t prim;
     // The number of the mesh, or `mesh_count` plus the number of the sphere set.
     uint32_t geometry;
-    // RT_NONE: there are no instances so far.
+    // The number of the instance, RT_NONE outside instances.
     uint32_t instance;
 } RtHit;
 
@@ -382,10 +385,12 @@ typedef struct RtPointHit {
 #define RT_ERROR_INTERNAL 16
 // `progress` returned false. The memory holds no structure and may be used again.
 #define RT_ERROR_CANCELLED 17
-// The block was not built with `RtBuildOptions.refit`, or it is a grid, which is built anew instead.
-#define RT_ERROR_NOT_REFITTABLE 18
-// Meshes, sphere sets, counts or vertex numbers are not those of the build.
-#define RT_ERROR_OTHER_SCENE 19
+// The map of an instance is not finite, or flattens space and has no inverse.
+#define RT_ERROR_SINGULAR 19
+// The accel of an instance has instances itself: there are two levels.
+#define RT_ERROR_NESTED 20
+// The block refers to other blocks by address: `rt_accel_pack` makes one of them that can be copied and saved.
+#define RT_ERROR_LINKED 21
 
 #ifdef __cplusplus
 extern "C" {
@@ -458,10 +463,11 @@ RtStatus rt_accel_open(const void *block, size_t size, const RtAccel **out);
 RtStatus rt_accel_pack_needs(const RtAccel *accel, RtMemory *out);
 
 // Writes the accel, with everything it refers to, as one block into `memory`, which has `size`
-// bytes and starts at a multiple of 64. As long as there are no instances, this is a copy.
+// bytes and starts at a multiple of 64: the accel of each instance once, however many show it. A block that refers to
+// nothing is copied.
 //
-// `memory` may overlap the accel, for example to move it to a tighter place; the old one is then
-// gone.
+// `memory` may overlap an accel that refers to nothing, for example to move it to a tighter place; the old one is then
+// gone. It must not overlap one that refers to others, nor these.
 RtStatus rt_accel_pack(const RtAccel *accel,
                        void *memory,
                        size_t size,

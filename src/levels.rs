@@ -30,6 +30,9 @@ pub(crate) fn closest<D: Across, W: Watch>(
 ) -> Option<Hit> {
     let level = block.level()?;
     let mut ask_in = |place: &Shown, ray: &Ray| {
+        if place.is_empty() {
+            return None;
+        }
         let question = ClosestHit::<D, _, 1>::new(place.choice(options), watch.lend());
         let hit = ask(place.block, ray, question)?;
         Some(Hit { instance: place.instance, ..hit })
@@ -67,7 +70,8 @@ pub(crate) fn any<D: Decide, W: Watch>(
 ) -> bool {
     let Some(level) = block.level() else { return false };
     let mut is_hit_in = |place: &Shown, ray: &Ray| {
-        ask(place.block, ray, AnyHit::<D, _>::new(place.choice(options), watch.lend()))
+        let question = AnyHit::<D, _>::new(place.choice(options), watch.lend());
+        !place.is_empty() && ask(place.block, ray, question)
     };
     if is_hit_in(&Shown::own(block), ray) {
         return true;
@@ -106,6 +110,11 @@ impl<'m> Shown<'m> {
         let seen = shares_bit(record.mask, options.mask);
         let block = level.child(record).filter(|_| seen)?;
         Some((Shown { block, instance }, record))
+    }
+
+    /// Whether it has no primitives of its own.
+    fn is_empty(&self) -> bool {
+        self.block.header().counts.prim_ids == 0
     }
 
     /// What `options` leave of it.

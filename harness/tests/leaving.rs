@@ -89,7 +89,8 @@ fn count_wrong(accel: &Accel, scene: &RenderScene, way: Way, step: u32) -> [usiz
 }
 
 fn check(name: &str, scene: &RenderScene, step: u32) {
-    type Build = fn(&raykern::Scene, &BuildOptions) -> Result<OwnedAccel, raykern::BuildError>;
+    type Built = Result<OwnedAccel<'static>, raykern::BuildError>;
+    type Build = fn(&raykern::Scene<'_, 'static>, &BuildOptions) -> Built;
     for build in [OwnedAccel::grid as Build, OwnedAccel::bvh] {
         let owned =
             scene.model.with_scene(|s| build(s, &BuildOptions::default()).expect("a build"));
