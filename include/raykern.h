@@ -356,7 +356,7 @@ typedef struct RtPointHit {
 #define RT_ERROR_INVALID_ARGUMENT 2
 // A struct is larger than this library knows, and the part it does not know is not zero.
 #define RT_ERROR_VERSION 3
-// The request is part of this header but not yet of the library.
+// The request is part of this header but not of the library: no call of this version returns it.
 #define RT_ERROR_UNSUPPORTED 4
 // A triangle names a vertex that its mesh does not have.
 #define RT_ERROR_INDEX_OUT_OF_RANGE 5
@@ -385,12 +385,16 @@ typedef struct RtPointHit {
 #define RT_ERROR_INTERNAL 16
 // `progress` returned false. The memory holds no structure and may be used again.
 #define RT_ERROR_CANCELLED 17
+// The block was not built with `RtBuildOptions.refit`, or it is a grid, which is built anew instead.
+#define RT_ERROR_NOT_REFITTABLE 18
+// Meshes, sphere sets, counts or vertex numbers are not those of the build.
+#define RT_ERROR_OTHER_SCENE 19
 // The map of an instance is not finite, or flattens space and has no inverse.
-#define RT_ERROR_SINGULAR 19
+#define RT_ERROR_SINGULAR 20
 // The accel of an instance has instances itself: there are two levels.
-#define RT_ERROR_NESTED 20
+#define RT_ERROR_NESTED 21
 // The block refers to other blocks by address: `rt_accel_pack` makes one of them that can be copied and saved.
-#define RT_ERROR_LINKED 21
+#define RT_ERROR_LINKED 22
 
 #ifdef __cplusplus
 extern "C" {
@@ -491,7 +495,7 @@ RtStatus rt_accel_refit_with(void *memory,
                              const RtScene *moved,
                              const RtBuildOptions *options);
 
-// The closest hit: the least `t`, and at equal `t` the first by geometry and primitive.
+// The closest hit: the least `t`, and at equal `t` the first by instance, geometry and primitive.
 //
 // Returns whether there is one, and writes it, or the miss, to `*hit`. When a pointer is null:
 // false, and nothing is written.
@@ -523,7 +527,7 @@ RtStatus rt_hit_surface(const RtAccel *accel,
                         RtSurface *out);
 
 // All hits that `query` leaves, null leaves everything, in the order of their real `t`; at equal `t` by
-// geometry and primitive. Writes the first of them to `hits`, as many as `capacity`, and returns how
+// instance, geometry and primitive. Writes the first of them to `hits`, as many as `capacity`, and returns how
 // many: the nearest few.
 //
 // With a cursor, which begins as zeros but for its `struct_size`, each call goes on after the last
@@ -531,7 +535,7 @@ RtStatus rt_hit_surface(const RtAccel *accel,
 // lost or given twice between two calls for the same accel, ray and query, even where several hits
 // round to one `t`. `cursor` may be null: each call begins with the first hit.
 //
-// Each primitive is given at most once, but a sphere twice: where the ray enters and where it leaves,
+// Each primitive of each instance is given at most once, but a sphere twice: where the ray enters and where it leaves,
 // also when it only touches. At a shared edge or vertex all triangles that are met are given. Exact
 // whatever `query->precision` is, and the first of all is that of `rt_intersect`. What is in `hits`
 // behind those returned may be written too.
@@ -553,8 +557,12 @@ size_t rt_all_hits(const RtAccel *accel,
 // refused: false, and nothing is written.
 //
 // Distances are computed in double precision, the same bits from every structure and on every machine,
-// and of equal ones the first by geometry and primitive wins. They are within 2^-46 of the distance plus the
+// and of equal ones the first by instance, geometry and primitive wins. They are within 2^-46 of the distance plus the
 // primitive's longest edge or diameter: nothing is closer by more than that.
+//
+// In instances they are those of the images of vertices, rounded to double precision, and of the ellipsoids that spheres
+// become; if a map stretches by at most 2^10 times as much along one axis as along another, within 2^-40 of
+// the distance and the longest axis. Takes time in proportion to the number of instances.
 //
 // Nothing is within a radius that is negative or NaN, from a point that is not finite, or beyond FLT_MAX.
 bool rt_closest_point(const RtAccel *accel,
