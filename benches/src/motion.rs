@@ -121,7 +121,7 @@ fn ours(still: &Model) -> Result<Vec<(String, Box<dyn Follower>)>> {
     Ok(followers)
 }
 
-struct Refitted(OwnedAccel);
+struct Refitted(OwnedAccel<'static>);
 
 impl Follower for Refitted {
     fn follow(&mut self, model: &Model, rays: &[Ray], hits: &mut [Hit]) -> [f64; 2] {
@@ -134,7 +134,7 @@ impl Follower for Refitted {
     }
 }
 
-type Build = fn(&Scene, &BuildOptions) -> Result<OwnedAccel, BuildError>;
+type Build = fn(&Scene<'_, 'static>, &BuildOptions) -> Result<OwnedAccel<'static>, BuildError>;
 
 struct Anew {
     build: Build,
