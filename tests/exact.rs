@@ -5,7 +5,7 @@
 mod common;
 
 use common::{All, agreed, odd_models, ray_towards, strewn};
-use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Ray, Scene, SphereSet};
+use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Scene, SphereSet};
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
