@@ -53,7 +53,7 @@ fn main() -> Result<()> {
         let growth = growth?;
         let (expected, traced) = trace(&followed, &rays);
         print!("{frame:>5} {refitted:>7.2} {:>8.2} {growth:>8.2}", speed(&rays, traced));
-        for build in [OwnedAccel::bvh as Build, OwnedAccel::grid] {
+        for build in [OwnedAccel::bvh as Build, OwnedAccel::grid as Build] {
             let (built, ms) = timed(|| model.with_scene(|scene| build(scene, &fast)));
             let (hits, traced) = trace(&built?, &rays);
             assert!(hits == expected, "frame {frame}: the answers differ");

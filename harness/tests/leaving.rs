@@ -91,7 +91,7 @@ fn count_wrong(accel: &Accel, scene: &RenderScene, way: Way, step: u32) -> [usiz
 fn check(name: &str, scene: &RenderScene, step: u32) {
     type Built = Result<OwnedAccel<'static>, raykern::BuildError>;
     type Build = fn(&raykern::Scene<'_, 'static>, &BuildOptions) -> Built;
-    for build in [OwnedAccel::grid as Build, OwnedAccel::bvh] {
+    for build in [OwnedAccel::grid as Build, OwnedAccel::bvh as Build] {
         let owned =
             scene.model.with_scene(|s| build(s, &BuildOptions::default()).expect("a build"));
         let [seen, wrong] = count_wrong(&owned.accel(), scene, Way::Origins, step);

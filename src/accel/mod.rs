@@ -322,7 +322,7 @@ impl<'m> Accel<'m> {
     }
 
     /// The surface at `hit`, which an intersect call on this accel returned for `ray`; `None` when
-    /// the ray has no such hit.
+    /// the ray has no such hit. Where both hits of a sphere round to one `t`, it is where the ray enters.
     ///
     /// The block keeps no way from a primitive's number to its place, so this follows the ray once
     /// more: it costs about as much as the intersect call did.
