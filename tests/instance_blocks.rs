@@ -139,6 +139,13 @@ fn needs_is_enough_and_the_minimum_too() {
 /// A packed block holds each child once, stands alone, can be copied and opened, and answers as before.
 #[test]
 fn packed_blocks_stand_alone() {
+    // Which of two children comes first in memory is not the test's to say.
+    pack_with([0, 1]);
+    pack_with([1, 0]);
+}
+
+/// With these of two children for even and odd pairs of instances.
+fn pack_with(order: [usize; 2]) {
     let mut random = Random::new(5);
     let rays = rays(&mut random, 300);
     let (maps, own) = (random_maps(&mut random, 9), make::plane(100));
@@ -146,7 +153,7 @@ fn packed_blocks_stand_alone() {
     let (packed, expected, size) = {
         let children = [bvh_of(&model()), bvh_of(&make::sphere(500).into())];
         let instances: Vec<_> = (maps.iter().enumerate())
-            .map(|(i, map)| Instance::new(&children[i.div_ceil(2) % 2].accel(), *map))
+            .map(|(i, map)| Instance::new(&children[order[i.div_ceil(2) % 2]].accel(), *map))
             .collect();
         let scene = Scene::new(&mesh, &[]).with_instances(&instances);
         let built = OwnedAccel::bvh(&scene, &BuildOptions::default()).expect("a BVH");
