@@ -77,7 +77,7 @@ fn made_and_odd_scenes() {
         let families =
             [Family::Random, Family::Inside, Family::FromSurface, Family::FromVertex, Family::Far];
         for (seed, family) in families.into_iter().enumerate() {
-            for ray in RayMaker::new(&model, seed as u64).many(family, 30) {
+            for ray in RayMaker::new(&model, seed as u64).many(family, 12) {
                 let options = QueryOptions::default();
                 if !ray.origin.iter().all(|x| x.is_finite()) {
                     // On a primitive that is not finite.
@@ -94,7 +94,7 @@ fn made_and_odd_scenes() {
             }
         }
         println!("{name}: {found}");
-        assert!(name == "none" || found > 100, "{name}: {found}");
+        assert!(name == "none" || found > 40, "{name}: {found}");
     }
 }
 
