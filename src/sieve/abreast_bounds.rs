@@ -40,7 +40,7 @@ fn packet_is_right(random: &mut Random, worst: &mut Worst) -> Result<u32, u32> {
         return Ok(0);
     }
     let mut block =
-        TriangleBlock { count: 1, aabb: Aabb::around(&corners), ..TriangleBlock::EMPTY };
+        TriangleBlock { count: 1, live: 1, aabb: Aabb::around(&corners), ..TriangleBlock::EMPTY };
     for (v, vertex) in corners.into_iter().enumerate() {
         block.set_corner(0, v, v);
         for (column, x) in block.vertices.iter_mut().zip(vertex) {
