@@ -8,7 +8,7 @@ mod motion;
 
 use common::{bits, choose_backend, odd_models};
 use raykern::{
-    Accel, AccelMut, BuildOptions, Hit, Info, Layout, Mesh, OwnedAccel, PlainList, Quality,
+    Accel, AccelMut, BuildOptions, Counts, Hit, Info, Layout, Mesh, OwnedAccel, PlainList, Quality,
     QueryOptions, Ray, RefitError, Scene, Strided, Threads, bvh_needs,
 };
 use raykern_harness::make;
@@ -34,10 +34,20 @@ fn models() -> Vec<(&'static str, Model)> {
     odd_models().into_iter().chain(made).collect()
 }
 
+/// Rays of a few families, and some bundles of rays that are alike, which a batch traces together.
 fn rays(model: &Model, each: usize) -> Vec<Ray> {
     let families = [Family::Random, Family::AtVertex, Family::AtEdge, Family::Bounce, Family::Far];
     let families = families.into_iter().zip(1..);
-    families.flat_map(|(family, seed)| RayMaker::new(model, seed).many(family, each)).collect()
+    let mut rays: Vec<Ray> =
+        families.flat_map(|(family, seed)| RayMaker::new(model, seed).many(family, each)).collect();
+    for ray in RayMaker::new(model, 9).many(Family::Random, 6) {
+        let [x, y, z] = ray.direction;
+        rays.extend((0..64).map(|i| {
+            let [a, b] = [i % 8, i / 8].map(|k| 1.0 + 0.02 * k as f32);
+            Ray { direction: [a * x, b * y, z], ..ray }
+        }));
+    }
+    rays
 }
 
 /// Everything that one structure answers, as bits.
@@ -152,7 +162,7 @@ fn refusal(built: &mut OwnedAccel, scene: &Scene) -> Option<RefitError> {
 
 #[test]
 fn what_was_not_built_for_it_is_left_as_it_is() {
-    let model: Model = make::blob(300, 1).into();
+    let model: Model = make::blob(5000, 1).into();
     let options = BuildOptions { plain_list: PlainList::Never, ..Default::default() };
     let refit = BuildOptions { refit: true, ..options };
     model.with_scene(|scene| {
@@ -168,7 +178,9 @@ fn what_was_not_built_for_it_is_left_as_it_is() {
             assert_eq!(built.accel().info().cost_growth, None);
             assert_eq!(refusal(&mut built, scene), Some(RefitError::NotRefittable));
         }
-        let mut chosen = OwnedAccel::automatic(scene, &refit).expect("a structure");
+        // So few rays would make it a grid.
+        let few = BuildOptions { rays_per_prim: 0.1, ..refit };
+        let mut chosen = OwnedAccel::automatic(scene, &few).expect("a structure");
         assert_eq!(refusal(&mut chosen, scene), None, "no grid was chosen");
     });
 }
@@ -211,23 +223,28 @@ fn other_scenes_are_refused() {
     }
 }
 
-/// Two vertices in one place may part.
+/// Two vertices in one place may part: triangles along a band that have no vertex in common, and then rise.
 #[test]
 fn vertices_are_the_same_by_their_numbers_alone() {
-    let triangles: Vec<[[f32; 3]; 3]> = (0..40)
-        .map(|i| [[i as f32, 0.0, 0.0], [i as f32 + 1.0, 0.0, 0.0], [i as f32, 1.0, 0.0]])
-        .collect();
-    let apart: Vec<_> =
-        (0..40).map(|i| triangles[i].map(|[x, y, z]| [x, y, z + 0.125 * (i as f32)])).collect();
+    let point = |i: usize| [(i / 2) as f32, (i % 2) as f32, 0.0];
+    let band: Vec<[[f32; 3]; 3]> =
+        (0..400).map(|i| [point(i), point(i + 1), point(i + 2)]).collect();
+    let height = |i: usize| 0.125 * i as f32;
+    let risen: Vec<_> = (0..400).map(|i| band[i].map(|[x, y, _]| [x, y, height(i)])).collect();
     for (kind, options) in all_options() {
-        let meshes = [Mesh::soup(&triangles)];
-        let mut built = OwnedAccel::bvh(&Scene::new(&meshes, &[]), &options).expect("a structure");
-        let moved = [Mesh::soup(&apart)];
+        let meshes = [Mesh::soup(&band)];
+        let built = OwnedAccel::bvh(&Scene::new(&meshes, &[]), &options);
+        let mut built = built.expect("a structure");
+        let layout = built.accel().info().layout;
+        let list = options.plain_list == PlainList::Always;
+        assert!(list || layout == options.layout, "{kind}: {layout:?}, for want of room");
+        let moved = [Mesh::soup(&risen)];
         built.refit(&Scene::new(&moved, &[]), None).expect("the same mesh");
-        for i in 0..40 {
-            let ray = Ray::new([i as f32 + 0.25, 0.25, 100.0], [0.0, 0.0, -1.0]);
-            let hit = built.accel().intersect(&ray).map(|hit| (hit.prim, hit.t));
-            assert_eq!(hit, Some((i, 100.0 - 0.125 * i as f32)), "{kind}");
+        for (i, corners) in band.iter().enumerate() {
+            let [x, y] = [0, 1].map(|k| corners.iter().map(|v| v[k]).sum::<f32>() / 3.0);
+            let hit = built.accel().intersect(&Ray::new([x, y, 100.0], [0.0, 0.0, -1.0]));
+            let hit = hit.map(|hit| (hit.prim as usize, hit.t));
+            assert_eq!(hit, Some((i, 100.0 - height(i))), "{kind}");
         }
     }
 }
@@ -296,6 +313,30 @@ fn costs_grow_with_disorder() {
         assert!((0.8..1.3).contains(&turned), "{kind}: {turned}");
         let wild = growth(motion::wild(&model));
         assert!(wild > 4.0, "{kind}: {wild}");
+    }
+}
+
+/// What is nowhere when the tree is built spoils it for nothing else.
+#[test]
+fn what_cannot_be_hit_is_in_nobodys_way() {
+    let mut model: Model = make::terrain(5000, 1).into();
+    for vertex in model.meshes[0].vertices.iter_mut().step_by(60) {
+        vertex[0] = f32::INFINITY;
+    }
+    model.meshes[0].vertices[77] = [-1e30; 3];
+    model.meshes[0].indices.extend([[77, 77, 5]; 100]);
+    let rays = rays(&make::terrain(5000, 1).into(), 100);
+    let steps = |options: &BuildOptions| {
+        let built = model.with_scene(|scene| OwnedAccel::bvh(scene, options)).expect("a BVH");
+        let mut counts = Counts::default();
+        for ray in &rays {
+            built.accel().intersect_counted(ray, &QueryOptions::default(), &mut counts);
+        }
+        counts.steps + counts.blocks
+    };
+    for (kind, options) in all_options().into_iter().skip(1) {
+        let (kept, plain) = (steps(&options), steps(&BuildOptions { refit: false, ..options }));
+        assert!(kept as f64 <= 1.3 * plain as f64, "{kind}: {kept} steps, not {plain}");
     }
 }
 

@@ -9,9 +9,7 @@ use crate::error::BuildError;
 use crate::interval::triangle::has_area;
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
-use crate::query::geometry_of;
-use crate::scene::{Mesh, Scene};
-use crate::simd::prefetch;
+use crate::scene::Scene;
 
 /// Flat numbers and block references leave two bits for other uses.
 const MOST_PRIMS: usize = 1 << 30;
@@ -67,16 +65,24 @@ impl Shape {
         sound.then_some(self)
     }
 
-    /// The box of a shape that perhaps cannot be hit, for a builder: within `bounds`, and finite if those are.
+    /// The box of a shape that perhaps cannot be hit, for a builder: within `bounds`, and finite if those are. Where it is
+    /// going to appear nobody knows; as much of it as is within the bounds is a guess that is in nobody's way.
     pub fn place(self, bounds: &Aabb) -> Aabb {
         if let Some(sound) = self.sound() {
             return sound.aabb();
         }
-        match self {
-            Shape::Triangle(corners) => Aabb::around(&corners.map(|v| bounds.nearest(v))),
-            Shape::Sphere { centre, .. } => Aabb::around(&[bounds.nearest(centre)]),
-            Shape::Box(aabb) => aabb,
+        let points = match self {
+            Shape::Triangle(corners) => corners,
+            Shape::Sphere { centre, .. } => [centre; 3],
+            Shape::Box(aabb) => return aabb,
+        };
+        let mut aabb = Aabb::EMPTY;
+        // Not so for NaN.
+        for point in points.into_iter().filter(|point| bounds.nearest(*point) == *point) {
+            aabb.add(&Aabb { lower: point, upper: point });
         }
+        let nowhere = aabb == Aabb::EMPTY;
+        if nowhere { Aabb::around(&[bounds.nearest(points[0])]) } else { aabb }
     }
 
     /// A box around the shape; for triangles the smallest. It may be infinite for huge spheres.
@@ -204,91 +210,8 @@ pub(crate) fn for_each_named_in(
     });
 }
 
-/// So many ids ahead shapes are fetched: about one fetch from memory takes as long.
-pub(crate) const AHEAD: usize = 16;
-
-/// Where shapes are looked up.
-#[derive(Clone, Copy)]
-pub(crate) struct Source<'s, 'a> {
-    pub scene: &'s Scene<'a, 'a>,
-    pub geometries: &'s [Geometry],
-    /// Whether triangles shall have the [names](Mesh::names) of their vertices in place of these.
-    pub named: bool,
-}
-
-impl<'s, 'a> Source<'s, 'a> {
-    pub fn shapes(self) -> Shapes<'s, 'a> {
-        Shapes { source: self, mesh: None }
-    }
-}
-
-/// Finds shapes by their flat numbers, quickly if the next one is of the same mesh.
-pub(crate) struct Shapes<'s, 'a> {
-    source: Source<'s, 'a>,
-    mesh: Option<(u32, Mesh<'a>)>,
-}
-
-impl<'s, 'a> Shapes<'s, 'a> {
-    pub fn new(scene: &'s Scene<'a, 'a>, geometries: &'s [Geometry]) -> Self {
-        Source { scene, geometries, named: false }.shapes()
-    }
-
-    /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
-    #[inline]
-    pub fn prefetch(&self, id: u32) {
-        let Some((first, mesh)) = &self.mesh else { return };
-        if let Some(index) = mesh.first_index(id.wrapping_sub(*first) as usize) {
-            prefetch(index);
-        }
-    }
-
-    /// Has the vertices of a shape fetched, if it is of the last one's mesh; its indices had better be in the cache.
-    #[inline]
-    pub fn prefetch_vertices(&self, id: u32) {
-        let Some((first, mesh)) = &self.mesh else { return };
-        if let Some(vertices) = mesh.first_words(id.wrapping_sub(*first) as usize) {
-            vertices.into_iter().for_each(prefetch);
-        }
-    }
-
-    /// The shape with flat number `id`, whether it can be hit or not.
-    #[inline]
-    pub fn get(&mut self, id: u32) -> Option<Shape> {
-        if let Some((first, mesh)) = &self.mesh
-            && let Some(triangle) =
-                id.checked_sub(*first).and_then(|i| self.triangle(*first, mesh, i))
-        {
-            return Some(triangle);
-        }
-        self.find(id)
-    }
-
-    #[inline]
-    fn triangle(&self, first: u32, mesh: &Mesh, i: u32) -> Option<Shape> {
-        if self.source.named {
-            return mesh.names(first, i as usize).map(Shape::Triangle);
-        }
-        mesh.triangle(i as usize).map(Shape::Triangle)
-    }
-
-    #[cold]
-    fn find(&mut self, id: u32) -> Option<Shape> {
-        let Source { scene, geometries, .. } = self.source;
-        if let Some(boxes) = scene.boxes() {
-            return Some(Shape::Box(boxes.aabb(id as usize)));
-        }
-        let (number, geometry) = geometry_of(id, geometries)?;
-        let (number, first) = (number as usize, geometry.first);
-        let prim = id - first;
-        self.mesh = scene.mesh(number).map(|mesh| (first, mesh));
-        match number.checked_sub(scene.mesh_count()) {
-            None => self.triangle(first, &scene.mesh(number)?, prim),
-            Some(set) => scene.sphere_set(set)?.sphere(prim as usize).map(sphere),
-        }
-    }
-}
-
-fn sphere([x, y, z, radius]: [f32; 4]) -> Shape {
+/// A sphere of a set.
+pub(super) fn sphere([x, y, z, radius]: [f32; 4]) -> Shape {
     Shape::Sphere { centre: [x, y, z], radius }
 }
 

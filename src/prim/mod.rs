@@ -4,15 +4,17 @@ mod gather;
 mod names;
 mod pack;
 mod refit;
+mod shapes;
 mod validate;
 
 pub(crate) use gather::{
-    AHEAD, GRAIN, Prim, Shape, Shapes, Source, Survey, for_each_counted, for_each_named_in,
-    for_each_prim_in, geometries, geometry_table, survey,
+    GRAIN, Prim, Shape, Survey, for_each_counted, for_each_named_in, for_each_prim_in, geometries,
+    geometry_table, survey,
 };
 pub(crate) use names::digest;
 pub(crate) use pack::{Packer, pack_in_order};
 pub(crate) use refit::refit_leaves;
+pub(crate) use shapes::{AHEAD, Shapes, Source};
 pub(crate) use validate::leaves_are_sound;
 
 use crate::block::Block;

@@ -1,7 +1,8 @@
 //! Leaf blocks over primitives that have moved.
 
 use super::Leaves;
-use super::gather::{AHEAD, Shape, Shapes, Source};
+use super::gather::Shape;
+use super::shapes::{AHEAD, Shapes, Source};
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock};
 use crate::caller::{Caller, PARTS};
 use crate::math::Aabb;

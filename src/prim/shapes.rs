@@ -1,0 +1,91 @@
+//! Shapes by their flat numbers.
+
+use super::gather::{Shape, sphere};
+use crate::block::Geometry;
+use crate::query::geometry_of;
+use crate::scene::{Mesh, Scene};
+use crate::simd::prefetch;
+
+/// So many ids ahead shapes are fetched: about one fetch from memory takes as long.
+pub(crate) const AHEAD: usize = 16;
+
+/// Where shapes are looked up.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'s, 'a> {
+    pub scene: &'s Scene<'a, 'a>,
+    pub geometries: &'s [Geometry],
+    /// Whether triangles shall have the [names](Mesh::names) of their vertices in place of these.
+    pub named: bool,
+}
+
+impl<'s, 'a> Source<'s, 'a> {
+    pub fn shapes(self) -> Shapes<'s, 'a> {
+        Shapes { source: self, mesh: None }
+    }
+}
+
+/// Finds shapes by their flat numbers, quickly if the next one is of the same mesh.
+pub(crate) struct Shapes<'s, 'a> {
+    source: Source<'s, 'a>,
+    mesh: Option<(u32, Mesh<'a>)>,
+}
+
+impl<'s, 'a> Shapes<'s, 'a> {
+    pub fn new(scene: &'s Scene<'a, 'a>, geometries: &'s [Geometry]) -> Self {
+        Source { scene, geometries, named: false }.shapes()
+    }
+
+    /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
+    #[inline]
+    pub fn prefetch(&self, id: u32) {
+        let Some((first, mesh)) = &self.mesh else { return };
+        if let Some(index) = mesh.first_index(id.wrapping_sub(*first) as usize) {
+            prefetch(index);
+        }
+    }
+
+    /// Has the vertices of a shape fetched, if it is of the last one's mesh; its indices had better be in the cache.
+    #[inline]
+    pub fn prefetch_vertices(&self, id: u32) {
+        let Some((first, mesh)) = &self.mesh else { return };
+        if let Some(vertices) = mesh.first_words(id.wrapping_sub(*first) as usize) {
+            vertices.into_iter().for_each(prefetch);
+        }
+    }
+
+    /// The shape with flat number `id`, whether it can be hit or not.
+    #[inline]
+    pub fn get(&mut self, id: u32) -> Option<Shape> {
+        if let Some((first, mesh)) = &self.mesh
+            && let Some(triangle) =
+                id.checked_sub(*first).and_then(|i| self.triangle(*first, mesh, i))
+        {
+            return Some(triangle);
+        }
+        self.find(id)
+    }
+
+    #[inline]
+    fn triangle(&self, first: u32, mesh: &Mesh, i: u32) -> Option<Shape> {
+        if self.source.named {
+            return mesh.names(first, i as usize).map(Shape::Triangle);
+        }
+        mesh.triangle(i as usize).map(Shape::Triangle)
+    }
+
+    #[cold]
+    fn find(&mut self, id: u32) -> Option<Shape> {
+        let Source { scene, geometries, .. } = self.source;
+        if let Some(boxes) = scene.boxes() {
+            return Some(Shape::Box(boxes.aabb(id as usize)));
+        }
+        let (number, geometry) = geometry_of(id, geometries)?;
+        let (number, first) = (number as usize, geometry.first);
+        let prim = id - first;
+        self.mesh = scene.mesh(number).map(|mesh| (first, mesh));
+        match number.checked_sub(scene.mesh_count()) {
+            None => self.triangle(first, &scene.mesh(number)?, prim),
+            Some(set) => scene.sphere_set(set)?.sphere(prim as usize).map(sphere),
+        }
+    }
+}
