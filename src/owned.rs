@@ -102,9 +102,11 @@ impl OwnedAccel<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::Layout;
     use crate::build::PlainList;
     use crate::error::OpenError;
-    use crate::scene::Mesh;
+    use crate::scene::{Mesh, SphereSet};
+    use std::vec::Vec;
 
     /// The first primitive id of a block over one geometry: behind the header and its line.
     const FIRST_ID: usize = 192;
@@ -128,5 +130,43 @@ mod tests {
                 assert_eq!(Accel::open(bytes).err(), Some(OpenError::Corrupt));
             }
         }
+    }
+
+    /// Whatever the bytes hold, even if they were never opened, no panic and no endless loop.
+    #[test]
+    fn any_bytes_may_be_refitted() {
+        let vertices: Vec<_> = (0..300).map(|i| [i as f32, (i * i % 17) as f32, 0.5]).collect();
+        let indices: Vec<_> = (0..298).map(|i| [i, i + 1, i + 2]).collect();
+        let spheres: Vec<_> = (0..40).map(|i| [i as f32, 3.0, 1.0, 0.25]).collect();
+        let (meshes, sets) = ([Mesh::indexed(&vertices, &indices)], [SphereSet::new(&spheres)]);
+        let scene = Scene::new(&meshes, &sets);
+        let mut state = 1u32;
+        let mut next = |end: usize| {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            (state >> 8) as usize % end
+        };
+        let never =
+            BuildOptions { refit: true, plain_list: PlainList::Never, ..Default::default() };
+        let list = BuildOptions { plain_list: PlainList::Always, ..never };
+        let (mut refitted, mut refused) = (0, 0);
+        for options in [list, never, BuildOptions { layout: Layout::Compact, ..never }] {
+            let built = OwnedAccel::bvh(&scene, &options).expect("a structure");
+            let good = built.accel().block();
+            let mut copy = AlignedMemory::new(good.len()).expect("memory");
+            for _ in 0..1000 {
+                copy.bytes_mut().copy_from_slice(good);
+                let reach = if next(4) == 0 { 256 } else { good.len() };
+                for _ in 0..=next(8) {
+                    copy.bytes_mut()[next(reach)] = next(256) as u8;
+                }
+                let sound = Accel::open(copy.bytes()).is_ok();
+                match refit(copy.bytes_mut(), &scene, &Caller::new(None, None)) {
+                    Ok(_) => refitted += 1,
+                    Err(_) => refused += 1,
+                }
+                assert!(!sound || Accel::open(copy.bytes()).is_ok(), "no block any more");
+            }
+        }
+        assert!(refitted > 500 && refused > 100, "{refitted} {refused}");
     }
 }

@@ -336,7 +336,7 @@ fn what_cannot_be_hit_is_in_nobodys_way() {
     };
     for (kind, options) in all_options().into_iter().skip(1) {
         let (kept, plain) = (steps(&options), steps(&BuildOptions { refit: false, ..options }));
-        assert!(kept as f64 <= 1.3 * plain as f64, "{kind}: {kept} steps, not {plain}");
+        assert!(kept as f64 <= 1.5 * plain as f64, "{kind}: {kept} steps, not {plain}");
     }
 }
 

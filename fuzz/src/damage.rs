@@ -117,7 +117,6 @@ impl Damage {
         for model in models() {
             let Ok(mut accel) = AccelMut::open(bytes.get_mut()) else { panic!("refused again") };
             if model.with_scene(|scene| accel.refit(scene, None)).is_ok() {
-                drop(accel);
                 let accel = Accel::open(bytes.get()).expect("as sound as before");
                 self.ask(&accel);
             }
