@@ -451,8 +451,9 @@ fn hostile_rays_get_the_same_answer_from_all() {
         let mut ray = Ray::new([odd(), odd(), odd()], [odd(), odd(), odd()]);
         if round % 3 == 0 {
             // Towards something, by a direction of any length.
-            let length = [1e-44, 1e-40, 1e10, 1e30][random.below(4)];
-            let to = point(&maps[random.below(14)], [0.1, 0.2, 0.3]);
+            let length = [2e-45, 1e-44, 1e10, 1e30][random.below(4)];
+            let to = [0, 1, 2].map(|_| random.between(-1.2, 1.2) as f32);
+            let to = point(&maps[random.below(14)], to);
             ray = towards(&mut random, to, 1.0);
             ray.direction = ray.direction.map(|x| x * length);
         } else if round % 3 == 1 {
