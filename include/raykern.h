@@ -2,8 +2,9 @@
 // Written by build.rs from src/capi; edit those.
 //
 // Memory    The library never allocates. `rt_*_needs` says how much a build wants; the caller passes
-//           it in and keeps it. A built accel is one block without pointers: it may be copied,
-//           written to a file or placed in ROM, and opened again. There is nothing to free.
+//           it in and keeps it. A built accel without instances, or a packed one, is one block
+//           without pointers: it may be copied, written to a file or placed in ROM, and opened
+//           again. There is nothing to free.
 // Pointers  None may be null unless its comment says so. All are checked for null and alignment.
 // Results   Every call that can fail returns an `RtStatus`. Outputs are written on RT_OK only.
 // Threads   None are started. Calls that take `const RtAccel *` may run at the same time on the same

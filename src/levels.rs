@@ -20,7 +20,6 @@ use crate::simd::{self, Kernel, Simd};
 use crate::trace::{AnyHit, ClosestHit, ClosestMet, ask, trace};
 
 /// The closest hit of a block with instances among what `options` leave.
-#[cold]
 #[inline(never)]
 pub(crate) fn closest<D: Across, W: Watch>(
     block: Finished,
@@ -60,7 +59,6 @@ pub(crate) fn closest<D: Across, W: Watch>(
 }
 
 /// Whether anything that `options` leave is hit in a block with instances.
-#[cold]
 #[inline(never)]
 pub(crate) fn any<D: Decide, W: Watch>(
     block: Finished,

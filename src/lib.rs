@@ -22,6 +22,8 @@
 //! - [`AccelMut`] and [`OwnedAccel`] follow what moves: a block that was built with [`BuildOptions::refit`] is refitted in
 //!   its place.
 //! - A block holds no pointers: it may be copied, saved, mapped, and [opened](Accel::open) again.
+//! - A scene may hold [`Instance`]s of built structures. What is built over them refers to their blocks, until it is
+//!   [packed](Accel::pack) with them into one.
 //!
 //! List, grid and BVH give the same answers, to the bit, for a scene and a ray: see
 //! [`Accel::intersect`] for what is promised of them in this version.

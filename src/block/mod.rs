@@ -8,7 +8,8 @@
 //! Every part starts at a multiple of 64 bytes and is empty in blocks that have no use for it. There
 //! are no pointers and no stored offsets: the counts in the header say where each part is, so a
 //! block can be copied, written to a file or placed in ROM. The order lets a build finish a part
-//! before it must know the size of the next. What follows in a block with instances is drawn in [`level`].
+//! before it must know the size of the next. What follows in a block with instances, and may
+//! refer to other blocks, is drawn in [`level`].
 
 pub(crate) mod bundle;
 pub(crate) mod cells;

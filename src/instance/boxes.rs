@@ -7,7 +7,7 @@ use crate::math::rounding::{f32_above, f32_below};
 use crate::scene::{Boxes, Scene};
 
 /// The boxes of the index are wide enough for rays from up to so many times as far away as the instances are.
-const CALM: f64 = 16.0;
+const CALM: f64 = 4.0;
 
 /// The instances of a scene, all of which have an inverse, and what is common to their boxes.
 #[derive(Clone, Copy)]
