@@ -146,6 +146,22 @@ static void open_with(RtStatus status, const RtAccel *accel, size_t offset, unsi
     seen[status] = true;
 }
 
+static void check_refit(void) {
+    RtMemory need;
+    const RtAccel *out;
+    for (uint32_t refit = 0; refit < 2; refit++) {
+        reset();
+        options.refit = refit;
+        CHECK(rt_bvh_needs(&scene, &options, &need) == RT_OK);
+        unsigned char *memory = aligned(need.size);
+        CHECK(rt_build_bvh(&scene, &options, memory, need.size, &out) == RT_OK);
+        RtScene empty = scene_of(NULL, 0, NULL, 0);
+        const RtStatus status = refit ? RT_ERROR_OTHER_SCENE : RT_ERROR_NOT_REFITTABLE;
+        CHECK(rt_accel_refit(memory, need.size, &empty) == status);
+        seen[status] = true;
+    }
+}
+
 static void check_open_and_queries(void) {
     const RtAccel *accel = built(&scene, false, NULL), *out = NULL;
     size_t size = rt_accel_size(accel);
@@ -227,8 +243,10 @@ static void check_open_and_queries(void) {
 int main(void) {
     check_builds();
     check_memory();
+    check_refit();
     check_open_and_queries();
-    for (RtStatus i = RT_OK + 1; i < RT_ERROR_INTERNAL; i++) CHECK(seen[i]);
-    for (RtStatus i = RT_ERROR_SINGULAR; i <= RT_ERROR_LINKED; i++) CHECK(seen[i]);
+    // 4 is no status.
+    for (RtStatus i = RT_OK + 1; i < RT_ERROR_INTERNAL; i++) CHECK(seen[i] || i == 4);
+    for (RtStatus i = RT_ERROR_NOT_REFITTABLE; i <= RT_ERROR_LINKED; i++) CHECK(seen[i]);
     return 0;
 }

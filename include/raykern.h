@@ -357,8 +357,6 @@ typedef struct RtPointHit {
 #define RT_ERROR_INVALID_ARGUMENT 2
 // A struct is larger than this library knows, and the part it does not know is not zero.
 #define RT_ERROR_VERSION 3
-// The request is part of this header but not of the library: no call of this version returns it.
-#define RT_ERROR_UNSUPPORTED 4
 // A triangle names a vertex that its mesh does not have.
 #define RT_ERROR_INDEX_OUT_OF_RANGE 5
 // The memory is smaller than the `minimum` of `rt_*_needs`.

@@ -17,8 +17,6 @@ pub const RT_ERROR_NULL_POINTER: RtStatus = 1;
 pub const RT_ERROR_INVALID_ARGUMENT: RtStatus = 2;
 /// A struct is larger than this library knows, and the part it does not know is not zero.
 pub const RT_ERROR_VERSION: RtStatus = 3;
-/// The request is part of this header but not of the library: no call of this version returns it.
-pub const RT_ERROR_UNSUPPORTED: RtStatus = 4;
 /// A triangle names a vertex that its mesh does not have.
 pub const RT_ERROR_INDEX_OUT_OF_RANGE: RtStatus = 5;
 /// The memory is smaller than the `minimum` of `rt_*_needs`.
@@ -159,7 +157,6 @@ fn message(status: RtStatus) -> &'static CStr {
         RT_ERROR_NULL_POINTER => c"a pointer is null that must not be",
         RT_ERROR_INVALID_ARGUMENT => c"a value is outside its range",
         RT_ERROR_VERSION => c"a struct is larger than this library knows",
-        RT_ERROR_UNSUPPORTED => c"this version of the library cannot do that yet",
         RT_ERROR_INDEX_OUT_OF_RANGE => c"a triangle names a vertex that its mesh does not have",
         RT_ERROR_OUT_OF_MEMORY => c"the memory is smaller than the minimum",
         RT_ERROR_MISALIGNED => c"a pointer is not aligned",
