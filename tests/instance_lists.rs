@@ -79,7 +79,7 @@ fn lists_are_exact_across_instances() {
         // The same thing twice at one place, so that everything in it is met twice at one `t`.
         maps.push(maps[0]);
         with_all(&own, &child, &maps, |accels| {
-            for _ in 0..12 {
+            for _ in 0..20 {
                 let target = child.meshes[0].vertices[random.below(20)];
                 let origin = [0; 3].map(|_| random.between(-4.0, 4.0) as f32);
                 let ray = Ray::new(origin, [0, 1, 2].map(|k| target[k] - origin[k]));
@@ -137,7 +137,11 @@ fn point_bits(found: Option<PointHit>) -> Option<[u32; 9]> {
 /// Where maps are exact, the closest point is to the bit that of the flattened scene.
 #[test]
 fn closest_points_are_those_of_the_flattened_scene() {
-    let (child, own): (Model, Model) = (make::blob(80, 5).into(), make::soup(20, 9).into());
+    let (mut child, own): (Model, Model) = (make::blob(80, 5).into(), make::soup(20, 9).into());
+    // Few bits, so that nothing is lost by moving it.
+    for x in child.meshes[0].vertices.as_flattened_mut() {
+        *x = (*x * 1024.0).round() / 1024.0;
+    }
     let mut random = Random::new(22);
     let mut instanced = 0;
     for _ in 0..8 {

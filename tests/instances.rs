@@ -472,9 +472,11 @@ fn hostile_rays_get_the_same_answer_from_all() {
 /// passes far away from.
 #[test]
 fn least_directions_are_what_they_are_rounded_to() {
-    let built = children(&child_model(1));
+    // So small that `t` is below the largest float.
+    const TINY: f32 = 1.0 / (1 << 27) as f32;
+    let built = children(&make::blob(120, 1).placed(TINY.into(), [0.0; 3]).into());
     let least = f32::from_bits(1);
-    let ray = Ray::new([-100.0, 0.0, 0.0], [3.0 * least, least, 0.0]);
+    let ray = Ray::new([-100.0 * TINY, 0.0, 0.0], [3.0 * least, least, 0.0]);
     let instances = [0, 1, 2, 3].map(|i| {
         let map = [2., 0., 0., 0., 0., 2., 0., 0., 0., 0., 2., 0.];
         Instance::new(&built[i].accel(), map)

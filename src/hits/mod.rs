@@ -8,7 +8,7 @@ use crate::query::{
     Choice, Decide, Exact, ExactMet, Filter, Meets, NextHits, PrimId, QueryOptions, Wanted,
     flat_number,
 };
-use crate::ray::{Hit, PreparedRay, Ray};
+use crate::ray::{Hit, NONE, PreparedRay, Ray};
 use crate::trace::{self, LocateHit, Question};
 
 /// A hit among all that a ray has: its primitive, which of two roots, and its `t`.
@@ -133,6 +133,9 @@ fn from(ray: &Ray, key: &HitKey) -> Ray {
 
 /// The meeting that `key` names, in a block that stands alone.
 fn locate(block: Finished, ray: &Ray, key: &HitKey) -> Option<ExactMet> {
+    if key.id.instance != NONE {
+        return None;
+    }
     let Block { geometries, header, .. } = block.parts();
     let prim = flat_number(&key.id, geometries, header.prim_limit)?;
     // Where the real `t` is, since it was rounded to the nearest float.
