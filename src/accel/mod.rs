@@ -129,7 +129,7 @@ impl<'m> Accel<'m> {
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         if self.0.has_level() {
-            return self.intersect_with(ray, &QueryOptions::default());
+            return self.intersect_levels(ray);
         }
         trace::ask(self.0, ray, ClosestHit::<Exact, _, 1>::new(Choice::EVERYTHING, ()))
     }
@@ -138,7 +138,7 @@ impl<'m> Accel<'m> {
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
         if self.0.has_level() {
-            return self.occluded_with(ray, &QueryOptions::default());
+            return self.occluded_levels(ray);
         }
         trace::ask(self.0, ray, AnyHit::<Exact, _>::new(Choice::EVERYTHING, ()))
     }
@@ -334,6 +334,20 @@ impl<'m> Accel<'m> {
         let instance = level.instances.get(hit.instance as usize)?;
         let spot = spot_of(level.child(instance)?, &instance.object_ray(ray)?, hit)?;
         Some(spot.mapped(&instance.map()).surface())
+    }
+
+    /// Out of line, so that calls for blocks without instances stay short.
+    #[cold]
+    #[inline(never)]
+    fn intersect_levels(&self, ray: &Ray) -> Option<Hit> {
+        self.intersect_with(ray, &QueryOptions::default())
+    }
+
+    /// Likewise.
+    #[cold]
+    #[inline(never)]
+    fn occluded_levels(&self, ray: &Ray) -> bool {
+        self.occluded_with(ray, &QueryOptions::default())
     }
 
     #[inline(always)]
