@@ -31,7 +31,9 @@ impl<'a> Caller<'a> {
         threads: Option<&'a dyn Threads>,
         progress: Option<&'a dyn Fn(f32) -> bool>,
     ) -> Caller<'a> {
-        let threads = threads.filter(|threads| threads.worker_count() > 1);
+        let lends = |threads: &&dyn Threads| threads.worker_count() > 1;
+        // Where a processor cannot tell which task was first, none are lent.
+        let threads = threads.filter(lends).filter(|_| cfg!(target_has_atomic = "32"));
         Caller { threads, progress, cancelled: Cell::new(false) }
     }
 
@@ -126,8 +128,22 @@ impl Taken {
     fn take(&self, i: u32) -> bool {
         let bit = 1 << (i % 32);
         let word = self.0.get(i as usize / 32);
-        word.is_some_and(|word| word.fetch_or(bit, Ordering::Relaxed) & bit == 0)
+        word.is_some_and(|word| set(word, bit) & bit == 0)
     }
+}
+
+/// Sets a bit; returns what was there before.
+#[cfg(target_has_atomic = "32")]
+fn set(word: &AtomicU32, bit: u32) -> u32 {
+    word.fetch_or(bit, Ordering::Relaxed)
+}
+
+/// The same on processors that cannot do that in one step, on which no threads are lent.
+#[cfg(not(target_has_atomic = "32"))]
+fn set(word: &AtomicU32, bit: u32) -> u32 {
+    let before = word.load(Ordering::Relaxed);
+    word.store(before | bit, Ordering::Relaxed);
+    before
 }
 
 #[cfg(test)]
