@@ -116,6 +116,7 @@ impl<'m> Shown<'m> {
     }
 
     /// What `options` leave of it.
+    #[inline(always)]
     pub fn choice(&self, options: &QueryOptions) -> Choice {
         let block = self.block.parts();
         Choice::new(options, self.instance, block.geometries, block.header.prim_limit)

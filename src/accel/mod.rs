@@ -5,12 +5,12 @@ mod sound;
 mod spot;
 
 use crate::batch;
+use crate::block::Finished;
 use crate::block::level::Level;
-use crate::block::{Block, Finished};
 use crate::closest::{self, PointHit};
 use crate::error::OpenError;
 use crate::hits::{self, HitKey, Hits};
-use crate::levels;
+use crate::levels::{self, Shown};
 use crate::query::{Choice, Counts, Exact, Precision, QueryOptions, Watch, Watertight};
 use crate::ray::{Hit, NONE, Ray};
 use crate::scene::Instance;
@@ -352,7 +352,6 @@ impl<'m> Accel<'m> {
 
     #[inline(always)]
     fn choice(&self, options: &QueryOptions) -> Choice {
-        let Block { header, geometries, .. } = self.0.parts();
-        Choice::new(options, NONE, geometries, header.prim_limit)
+        Shown::own(self.0).choice(options)
     }
 }

@@ -35,3 +35,33 @@ macro_rules! width {
         }
     };
 }
+
+/// Operations of a backend that its vector of four, `F4`, has itself.
+macro_rules! by_four {
+    () => {
+        #[inline(always)]
+        fn largest_of_three(self, v: F4) -> F4 {
+            v.largest_of_three()
+        }
+
+        #[inline(always)]
+        fn least_of_three(self, v: F4) -> F4 {
+            v.least_of_three()
+        }
+
+        #[inline(always)]
+        fn where_less_or_equal(self, a: F4, b: F4, v: F4) -> F4 {
+            a.where_less_or_equal(b, v)
+        }
+
+        #[inline(always)]
+        fn whole(self, v: F4) -> [i32; 4] {
+            v.whole()
+        }
+
+        #[inline(always)]
+        fn floats(self, whole: [i32; 4]) -> F4 {
+            F4::from_whole(whole)
+        }
+    };
+}
