@@ -1,4 +1,4 @@
-//! Batches give the bits of single calls, whichever way they go: together, in flight, or one by one.
+//! Batches give the bits of single calls, whichever way they go: as one, as a stream, in flight, or one by one.
 
 #![allow(missing_docs)]
 
@@ -45,10 +45,10 @@ fn same_in_all(model: &Model, rays: &[Ray]) -> usize {
     all.accels().iter().map(|(name, accel)| same_in_a_batch(name, accel, rays)).sum()
 }
 
-/// A mesh of more bytes than are near, with others in front of it.
-fn far(meshes: &[TriangleMesh]) -> OwnedAccel<'static> {
+/// A mesh of more bytes than are near, beside others, which are large in the scene or, if it is far `away`, small.
+fn far(meshes: &[TriangleMesh], away: f32) -> OwnedAccel<'static> {
     let mut large = make::sphere(600_000);
-    large.vertices.iter_mut().for_each(|v| v[0] += 100.0);
+    large.vertices.iter_mut().for_each(|v| v[0] += away);
     let meshes: Vec<Mesh> = meshes
         .iter()
         .chain([&large])
@@ -80,12 +80,34 @@ fn incoherent_rays() {
     for count in [0, 1, 2, 11, 12, 13, 40, 1_000] {
         same_in_all(&model, &rays[..count]);
     }
-    let (near, far) = (make::blob(1_500, 4), far(&[make::blob(1_500, 4)]));
-    let rays = with_odd_ones(RayMaker::new(&near.into(), 3).many(Family::Random, 1_000));
-    for count in [2, 11, 12, 13, 40, 1_000] {
-        let hits = same_in_a_batch("far", &far.accel(), &rays[..count]);
-        assert!(count < 1_000 || hits > 100, "{hits}");
+    let near = make::blob(1_500, 4);
+    let rays = with_odd_ones(RayMaker::new(&near.clone().into(), 3).many(Family::Random, 1_000));
+    // Several in flight where they begin apart, and as streams where they begin together.
+    for away in [3.0, 100.0] {
+        let far = far(std::slice::from_ref(&near), away);
+        for count in [2, 11, 12, 13, 31, 32, 33, 40, 1_000] {
+            let hits = same_in_a_batch("far", &far.accel(), &rays[..count]);
+            assert!(count < 1_000 || hits > 100, "{hits}");
+        }
     }
+}
+
+#[test]
+fn rays_that_leave_a_surface() {
+    let mesh = make::blob(20_000, 4);
+    let model: Model = mesh.clone().into();
+    let mut around = RayMaker::new(&model, 5);
+    // From the same places one after the other, some inwards and some outwards.
+    let rays: Vec<Ray> = around
+        .many(Family::Random, 600)
+        .into_iter()
+        .enumerate()
+        .map(|(i, ray)| {
+            let [a, _, _] = mesh.indices[i / 40].map(|v| mesh.vertices[v as usize]);
+            Ray { origin: a, ..ray }.with_limits(0.0, if i % 3 == 0 { 0.3 } else { f32::INFINITY })
+        })
+        .collect();
+    assert!(same_in_all(&model, &with_odd_ones(rays)) > 1_000);
 }
 
 #[test]
@@ -109,8 +131,15 @@ fn rays_with_much_to_come_back_to() {
             Ray::new([0.0; 3], [side * i as f32, 0.002 * i as f32, 1.0])
         })
         .collect();
-    assert!(same_in_a_batch("far", &far(&[mesh.clone()]).accel(), &rays) > 40);
-    assert!(same_in_all(&mesh.into(), &rays) > 100);
+    // Every second from further away, so that they begin apart.
+    let apart: Vec<Ray> = (0..50)
+        .map(|i| Ray { origin: [0.0, 0.0, -1e9 * (i % 2) as f32], ..rays[i] })
+        .collect();
+    let far = far(std::slice::from_ref(&mesh), 100.0);
+    for rays in [&rays, &apart] {
+        assert!(same_in_a_batch("far", &far.accel(), rays) > 40);
+        assert!(same_in_all(&mesh.clone().into(), rays) > 100);
+    }
 }
 
 /// Rays through the pixels of `side` by `side`, tile by tile, from a point to a square around another.

@@ -1,7 +1,9 @@
-//! Many rays through one block: together where they are alike, and several in flight where they are not.
+//! Many rays through one block: as one where they are alike, as a stream where they begin together, and else several in
+//! flight.
 
 mod flights;
 mod packet;
+mod stream;
 
 use crate::block::bundle::Bundle;
 use crate::block::{Block, Bundles, Finished};
@@ -13,8 +15,8 @@ use crate::trace::{Question, Together, ask};
 /// Of blocks of fewer bytes, what rays visit mostly is in the cache, and single calls then wait for nothing that others could
 /// use: with closest hits, and with any hits, which are over sooner.
 const NEAR: [usize; 2] = [2 << 20, 16 << 20];
-/// The same for rays that begin where the one before did, and so visit again what that brought near.
-const NEAR_TOGETHER: usize = 31 << 20;
+/// Of blocks of fewer bytes, so much is visited by all rays that they go together wherever they begin.
+const SMALL: usize = 128 << 10;
 /// How far apart two rays begin that have nothing to do with each other, of the scene's largest coordinate.
 const FAR: f32 = 1.0 / 64.0;
 /// So many rays are looked at for that.
@@ -61,6 +63,14 @@ struct Batch<'a, 'm, Q: Question<'m>, A> {
     keep: fn(Q::Answer) -> A,
 }
 
+/// See the modules of these names.
+#[derive(Clone, Copy)]
+enum Way {
+    Stream,
+    InFlight,
+    OneByOne,
+}
+
 impl<'m, Q: Together<'m>, A> Kernel for Batch<'_, 'm, Q, A> {
     type Output = ();
 
@@ -71,17 +81,13 @@ impl<'m, Q: Together<'m>, A> Kernel for Batch<'_, 'm, Q, A> {
             return ask_each(block.whole, rays, answers, question, keep);
         }
         let count = self.rays.len().min(self.answers.len());
-        let size = self.block.whole.bytes().len();
         let mut first = 0;
         while first < count {
             let (alike, end) = self.stretch(s, first, count);
             let part = self.part(first, end);
-            if let Some(alike) = alike {
-                part.trace_together(s, alike);
-            } else if size < part.least_to_fly() {
-                ask_each(part.block.whole, part.rays, part.answers, part.question, part.keep);
-            } else {
-                part.fly(s);
+            match alike {
+                Some(alike) => part.trace_together(s, alike),
+                None => part.trace_apart(s),
             }
             first = end;
         }
@@ -103,9 +109,34 @@ impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
         (None, end)
     }
 
-    /// The bytes of a block in which some of these rays are so often waited for that others had better go on meanwhile.
+    /// Traces rays that are not alike.
     #[inline(always)]
-    fn least_to_fly(&self) -> usize {
+    fn trace_apart<S: Simd>(self, s: S) {
+        match self.way() {
+            Way::Stream => self.stream(s),
+            Way::InFlight => self.fly(s),
+            Way::OneByOne => {
+                let Batch { block, rays, answers, question, keep, .. } = self;
+                ask_each(block.whole, rays, answers, question, keep);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn way(&self) -> Way {
+        let size = self.block.whole.bytes().len();
+        if size < SMALL || self.begin_together() {
+            Way::Stream
+        } else if size < NEAR[usize::from(!Q::Query::ORDERED)] {
+            Way::OneByOne
+        } else {
+            Way::InFlight
+        }
+    }
+
+    /// Whether most rays begin near the one before.
+    #[inline(always)]
+    fn begin_together(&self) -> bool {
         let far = FAR * self.block.header.reach;
         let (mut pairs, mut apart) = (0, 0);
         for pair in self.rays.windows(2).take(LOOKED_AT) {
@@ -116,8 +147,7 @@ impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
             pairs += 1;
             apart += usize::from(most > far);
         }
-        let together = if 2 * apart < pairs { NEAR_TOGETHER } else { 0 };
-        together.max(NEAR[usize::from(!Q::Query::ORDERED)])
+        2 * apart < pairs
     }
 
     /// The rays from `first` to `end`.

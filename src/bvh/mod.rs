@@ -16,6 +16,7 @@ mod refit;
 mod refs;
 mod reinsert;
 mod search;
+mod shared;
 mod spatial;
 mod split;
 mod stack;
@@ -32,10 +33,11 @@ pub(crate) use bins::Effort;
 pub(crate) use compact::{build, needs};
 pub(crate) use refit::{Cost, refit_bundles, refit_nodes};
 pub(crate) use search::{search, search_wide};
+pub(crate) use shared::SharedStack;
 pub(crate) use stack::Columns;
 pub(crate) use traverse::traverse;
 pub(crate) use validate::{bundles_are_sound, tree_is_sound};
-pub(crate) use wide::{ENOUGH_ROOM, Walk, traverse_wide};
+pub(crate) use wide::{ENOUGH_ROOM, Walk, fetch, traverse_wide};
 pub(crate) use wide_build::{build_wide, needs_wide};
 
 /// No path from the root is longer, whatever the scene, so a stack of this many entries suffices.

@@ -113,6 +113,24 @@ pub(crate) trait Width<const N: usize>: Copy {
         }
     }
 
+    /// Sets the bits of `bits` in the words of `mask`.
+    #[inline(always)]
+    fn add_to_words(self, mask: u32, bits: u32, words: &mut [u32; N]) {
+        for (i, place) in words.iter_mut().enumerate() {
+            *place |= if mask >> i & 1 == 1 { bits } else { 0 };
+        }
+    }
+
+    /// One bit for each word that is not zero.
+    #[inline(always)]
+    fn used_words(self, words: &[u32; N]) -> u32 {
+        let mut used = 0;
+        for (i, word) in words.iter().enumerate() {
+            used |= u32::from(*word != 0) << i;
+        }
+        used
+    }
+
     /// Writes the words of `mask` in order to the front of `out`, and anything behind them.
     #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]) {

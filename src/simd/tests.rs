@@ -88,6 +88,11 @@ fn masked<S: Width<16>>(s: S, input: &Input) {
     s.set_words(mask, 7, &mut words);
     Scalar.set_words(mask, 7, &mut expected);
     assert_eq!(words, expected, "set_words {mask:x}");
+    s.add_to_words(mask, 1 << 20, &mut words);
+    Scalar.add_to_words(mask, 1 << 20, &mut expected);
+    assert_eq!(words, expected, "add_to_words {mask:x}");
+    s.set_words(mask, 0, &mut words);
+    assert_eq!(s.used_words(&words), Scalar.used_words(&words), "used_words {words:x?}");
 }
 
 #[inline(always)]

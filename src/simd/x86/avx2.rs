@@ -81,6 +81,19 @@ doubled! {
     }
 
     #[inline(always)]
+    fn add_to_words(self, mask: u32, bits: u32, words: &mut [u32; 16]) {
+        // SAFETY: the token proves AVX2; the array has 16 words.
+        unsafe {
+            let (all, low) = (_mm256_set1_epi32(bits as i32), words.as_mut_ptr().cast::<__m256i>());
+            let high = low.add(1);
+            let added = _mm256_and_si256(lanes_of(mask), all);
+            _mm256_storeu_si256(low, _mm256_or_si256(_mm256_loadu_si256(low), added));
+            let added = _mm256_and_si256(lanes_of(mask >> 8), all);
+            _mm256_storeu_si256(high, _mm256_or_si256(_mm256_loadu_si256(high), added));
+        }
+    }
+
+    #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; 16], out: &mut [MaybeUninit<u32>; 16]) {
         let (low, high) = (mask & 0xFF, mask >> 8 & 0xFF);
         // SAFETY: the token proves AVX2; both arrays have 16 words, and a half has eight at most.

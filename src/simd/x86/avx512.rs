@@ -83,6 +83,26 @@ width! {
     }
 
     #[inline(always)]
+    fn add_to_words(self, mask: u32, bits: u32, words: &mut [u32; 16]) {
+        // SAFETY: the token proves AVX-512 F; the array has 16 words.
+        unsafe {
+            let (place, bits) = (words.as_mut_ptr().cast(), _mm512_set1_epi32(bits as i32));
+            let before = _mm512_loadu_si512(place);
+            let after = _mm512_mask_or_epi32(before, mask as __mmask16, before, bits);
+            _mm512_storeu_si512(place, after);
+        }
+    }
+
+    #[inline(always)]
+    fn used_words(self, words: &[u32; 16]) -> u32 {
+        // SAFETY: the token proves AVX-512 F; the array has 16 words.
+        unsafe {
+            let words = _mm512_loadu_si512(words.as_ptr().cast());
+            u32::from(_mm512_test_epi32_mask(words, words))
+        }
+    }
+
+    #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; 16], out: &mut [MaybeUninit<u32>; 16]) {
         // SAFETY: the token proves AVX-512 F; both arrays have 16 words.
         unsafe {
