@@ -6,12 +6,12 @@ use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place};
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
-use crate::prim::Leaves;
+use crate::prim::{self, Leaves};
 use crate::query::{
-    Any, Choice, Closest, Decide, Exact, ExactMet, Filter, Locate, Meets, Query, Wanted, Watch,
-    geometry_of,
+    Any, Choice, Closest, Decide, Exact, ExactMet, Filter, Locate, Meets, Query, SureMeetings,
+    Wanted, Watch, geometry_of,
 };
-use crate::ray::{Hit, Interval, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
+use crate::ray::{Abreast, Hit, Interval, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
 
 /// What is asked of a ray.
@@ -114,14 +114,59 @@ impl<'m, D: Decide, W: Watch> Question<'m> for AnyHit<D, W> {
     }
 }
 
+/// What each of sixteen rays meets before all others: a lane of a leaf block.
+#[derive(Clone, Copy)]
+pub(crate) struct Firsts {
+    /// The block's number and kind, as in a [`LeafRef`].
+    pub blocks: [u32; 16],
+    /// One bit.
+    pub lanes: [u32; 16],
+}
+
+impl Firsts {
+    pub const NONE: Self = Firsts { blocks: [0; 16], lanes: [0; 16] };
+
+    /// What ray `i` meets.
+    #[inline(always)]
+    pub fn leaf(&self, i: usize) -> LeafRef {
+        LeafRef { block: self.blocks[i % 16], lanes: self.lanes[i % 16] }
+    }
+}
+
+/// The triangle in the one lane of `leaf`.
+#[inline(always)]
+fn met_triangle(block: &Block, leaf: LeafRef) -> Option<(Place, [[f32; 3]; 3])> {
+    let (number, lane) = (leaf.number(), leaf.lanes.trailing_zeros());
+    let triangles = block.triangle_blocks.get(number).filter(|_| leaf.kind() == KIND_TRIANGLES)?;
+    let entry = triangles.first.wrapping_add(lane);
+    Some((Place { block: number as u32, lane, entry }, triangles.triangle(lane as usize)))
+}
+
+/// Writes a triangle into the lanes from `first` on: all that follow may meet the same one.
+#[inline(always)]
+fn fill_from(first: usize, columns: &mut [[f32; 8]; 9], triangle: &[[f32; 3]; 3]) {
+    for (column, x) in columns.iter_mut().zip(triangle.as_flattened()) {
+        for (lane, place) in column.iter_mut().enumerate() {
+            *place = if lane < first { *place } else { *x };
+        }
+    }
+}
+
 /// A question that rays can ask together, by what is sure of each without a query.
 pub(crate) trait Together<'m>: Question<'m> + Copy {
     /// Whether it leaves no primitive out.
     fn sees_all(&self) -> bool;
 
-    /// The answer for a ray that meets the primitive in the one lane of `leaf` before all others, within its limits; `None`
-    /// when that takes more than a look.
-    fn of_sure(block: &Block, ray: &Ray, leaf: LeafRef) -> Option<Self::Answer>;
+    /// Answers by `write` for rays of which it is sure what they meet before all others, within their limits: those of
+    /// `rays` in the lanes of `lanes`. The lanes of those for which that takes more than a look.
+    fn settle<S: Simd>(
+        s: S,
+        block: &Block,
+        rays: &Abreast,
+        firsts: &Firsts,
+        lanes: u32,
+        write: impl FnMut(usize, Self::Answer),
+    ) -> u32;
 
     /// What a query was offered before all else, and the `t` between which it is met.
     fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)>;
@@ -134,14 +179,46 @@ impl<'m, const MEMORY: usize> Together<'m> for ClosestHit<Exact, (), MEMORY> {
     }
 
     #[inline(always)]
-    fn of_sure(block: &Block, ray: &Ray, leaf: LeafRef) -> Option<Option<Hit>> {
-        let (number, lane) = (leaf.number(), leaf.lanes.trailing_zeros());
-        let triangles =
-            block.triangle_blocks.get(number).filter(|_| leaf.kind() == KIND_TRIANGLES)?;
-        let (t, weights) = Exact::of_sure(ray, triangles.triangle(lane as usize))?;
-        let entry = triangles.first.wrapping_add(lane);
-        let place = Place { block: number as u32, lane, entry };
-        Some(Some(record(block, place, t, weights)))
+    fn settle<S: Simd>(
+        s: S,
+        block: &Block,
+        rays: &Abreast,
+        firsts: &Firsts,
+        lanes: u32,
+        mut write: impl FnMut(usize, Option<Hit>),
+    ) -> u32 {
+        let mut unsettled = lanes;
+        for half in [0, 8] {
+            let mut corners = [[0.0; 8]; 9];
+            let mut named = [None; 8];
+            let mut last = None;
+            for i in prim::Lanes(lanes >> half & 0xFF) {
+                let leaf = firsts.leaf(half + i);
+                let name = match last {
+                    Some((known, name)) if known == leaf => name,
+                    _ => {
+                        let Some((place, triangle)) = met_triangle(block, leaf) else { continue };
+                        fill_from(i, &mut corners, &triangle);
+                        let name = name(block, place);
+                        last = Some((leaf, name));
+                        name
+                    }
+                };
+                named[i % 8] = Some(name);
+            }
+            let SureMeetings { sure, t, weights: [u, v] } =
+                Exact::of_sure(s, rays.lines(half), &corners);
+            for (i, name) in named.into_iter().enumerate() {
+                if let Some(Name { prim, geometry }) = name
+                    && sure >> i & 1 == 1
+                {
+                    let hit = Hit { t: t[i], u: u[i], v: v[i], prim, geometry, instance: NONE };
+                    write(half + i, Some(hit));
+                    unsettled &= !(1 << (half + i));
+                }
+            }
+        }
+        unsettled
     }
 
     fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
@@ -156,8 +233,18 @@ impl<'m> Together<'m> for AnyHit<Exact, ()> {
     }
 
     #[inline(always)]
-    fn of_sure(_: &Block, _: &Ray, _: LeafRef) -> Option<bool> {
-        Some(true)
+    fn settle<S: Simd>(
+        _: S,
+        _: &Block,
+        _: &Abreast,
+        _: &Firsts,
+        lanes: u32,
+        mut write: impl FnMut(usize, bool),
+    ) -> u32 {
+        for lane in prim::Lanes(lanes) {
+            write(lane, true);
+        }
+        0
     }
 
     fn best(_: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
@@ -280,10 +367,23 @@ fn hit<D: Decide>(
 /// The record of a meeting.
 #[inline(always)]
 pub(crate) fn record(block: &Block, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
+    let Name { prim, geometry } = name(block, place);
+    Hit { t, u, v, prim, geometry, instance: NONE }
+}
+
+/// What the caller calls a primitive.
+#[derive(Clone, Copy)]
+struct Name {
+    prim: u32,
+    geometry: u32,
+}
+
+#[inline(always)]
+fn name(block: &Block, place: Place) -> Name {
     let number = place.prim(block.prim_ids);
     let (geometry, first) =
         geometry_of(number, block.geometries).map_or((NONE, 0), |(place, g)| (place, g.first));
-    Hit { t, u, v, prim: number - first, geometry, instance: NONE }
+    Name { prim: number - first, geometry }
 }
 
 /// Offers `query` what the ray meets, by the one traversal of the structure at hand.

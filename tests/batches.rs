@@ -132,9 +132,8 @@ fn rays_with_much_to_come_back_to() {
         })
         .collect();
     // Every second from further away, so that they begin apart.
-    let apart: Vec<Ray> = (0..50)
-        .map(|i| Ray { origin: [0.0, 0.0, -1e9 * (i % 2) as f32], ..rays[i] })
-        .collect();
+    let apart: Vec<Ray> =
+        (0..50).map(|i| Ray { origin: [0.0, 0.0, -1e9 * (i % 2) as f32], ..rays[i] }).collect();
     let far = far(std::slice::from_ref(&mesh), 100.0);
     for rays in [&rays, &apart] {
         assert!(same_in_a_batch("far", &far.accel(), rays) > 40);

@@ -168,10 +168,9 @@ impl<'m> Accel<'m> {
     /// Stops at the end of the shorter slice.
     pub fn intersect_batch_with(&self, rays: &[Ray], options: &QueryOptions, hits: &mut [Hit]) {
         let (block, choice) = (self.0, self.choice(options));
-        let keep = |hit: Option<Hit>| hit.unwrap_or(Hit::MISS);
         if block.has_level() {
             for (ray, hit) in rays.iter().zip(hits) {
-                *hit = keep(self.intersect_with(ray, options));
+                *hit = self.intersect_with(ray, options).unwrap_or(Hit::MISS);
             }
             return;
         }
@@ -179,11 +178,11 @@ impl<'m> Accel<'m> {
             Precision::Exact => {
                 // Many of them are in flight, so each had better be small.
                 let question = ClosestHit::<Exact, _, 0>::new(choice, ());
-                batch::ask_all(block, rays, hits, question, keep);
+                batch::ask_all(block, rays, hits, question);
             }
             Precision::Watertight => {
                 let question = ClosestHit::<Watertight, _, 1>::new(choice, ());
-                batch::ask_each(block, rays, hits, question, keep);
+                batch::ask_each(block, rays, hits, question);
             }
         }
     }
@@ -191,7 +190,6 @@ impl<'m> Accel<'m> {
     /// [`occluded_with`](Self::occluded_with) for each ray. Stops at the end of the shorter slice.
     pub fn occluded_batch_with(&self, rays: &[Ray], options: &QueryOptions, occluded: &mut [bool]) {
         let (block, choice) = (self.0, self.choice(options));
-        let keep = |occluded| occluded;
         if block.has_level() {
             for (ray, occluded) in rays.iter().zip(occluded) {
                 *occluded = self.occluded_with(ray, options);
@@ -200,11 +198,11 @@ impl<'m> Accel<'m> {
         }
         match options.precision {
             Precision::Exact => {
-                batch::ask_all(block, rays, occluded, AnyHit::<Exact, _>::new(choice, ()), keep);
+                batch::ask_all(block, rays, occluded, AnyHit::<Exact, _>::new(choice, ()));
             }
             Precision::Watertight => {
                 let question = AnyHit::<Watertight, _>::new(choice, ());
-                batch::ask_each(block, rays, occluded, question, keep);
+                batch::ask_each(block, rays, occluded, question);
             }
         }
     }

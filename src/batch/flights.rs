@@ -1,6 +1,6 @@
 //! Several rays in flight.
 
-use super::Batch;
+use super::{Batch, Record};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::bvh::{Columns, Walk};
 use crate::prim::Leaves;
@@ -40,7 +40,7 @@ enum Turn {
     Crowded,
 }
 
-impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
+impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Traces rays that have little in common: while the memory that one needs next is on its way, the others go on.
     #[inline(always)]
     pub(super) fn fly<S: Simd>(mut self, s: S) {

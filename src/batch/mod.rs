@@ -8,7 +8,7 @@ mod stream;
 use crate::block::bundle::Bundle;
 use crate::block::{Block, Bundles, Finished};
 use crate::query::Query;
-use crate::ray::{Alike, Ray};
+use crate::ray::{Alike, Hit, Ray};
 use crate::simd::{self, Kernel, Simd};
 use crate::trace::{Question, Together, ask};
 
@@ -22,34 +22,51 @@ const FAR: f32 = 1.0 / 64.0;
 /// So many rays are looked at for that.
 const LOOKED_AT: usize = 64;
 
-/// Answers `question` for each ray, by `keep` into its answer; stops at the end of the shorter slice.
-pub(crate) fn ask_all<'m, Q: Together<'m>, A>(
+/// What an answer is written down as.
+pub(crate) trait Record<Answer> {
+    fn of(answer: Answer) -> Self;
+}
+
+impl Record<Option<Hit>> for Hit {
+    #[inline(always)]
+    fn of(hit: Option<Hit>) -> Hit {
+        hit.unwrap_or(Hit::MISS)
+    }
+}
+
+impl Record<bool> for bool {
+    #[inline(always)]
+    fn of(occluded: bool) -> bool {
+        occluded
+    }
+}
+
+/// Answers `question` for each ray; stops at the end of the shorter slice.
+pub(crate) fn ask_all<'m, Q: Together<'m>, A: Record<Q::Answer>>(
     block: Finished<'m>,
     rays: &[Ray],
     answers: &mut [A],
     question: Q,
-    keep: fn(Q::Answer) -> A,
 ) {
     // Only for the layout that is chosen automatically: others would be more copies of the code.
     let parts = &block.parts();
     match parts.bundles {
         Bundles::Sixteen(bundles) if rays.len() > 1 => {
-            simd::dispatch(Batch { block: parts, bundles, rays, answers, question, keep });
+            simd::dispatch(Batch { block: parts, bundles, rays, answers, question });
         }
-        _ => ask_each(block, rays, answers, question, keep),
+        _ => ask_each(block, rays, answers, question),
     }
 }
 
 /// The same, one ray after the other.
-pub(crate) fn ask_each<'m, Q: Question<'m> + Copy, A>(
+pub(crate) fn ask_each<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>>(
     block: Finished<'m>,
     rays: &[Ray],
     answers: &mut [A],
     question: Q,
-    keep: fn(Q::Answer) -> A,
 ) {
     for (ray, answer) in rays.iter().zip(answers) {
-        *answer = keep(ask(block, ray, question));
+        *answer = A::of(ask(block, ray, question));
     }
 }
 
@@ -60,7 +77,6 @@ struct Batch<'a, 'm, Q: Question<'m>, A> {
     rays: &'a [Ray],
     answers: &'a mut [A],
     question: Q,
-    keep: fn(Q::Answer) -> A,
 }
 
 /// See the modules of these names.
@@ -71,14 +87,14 @@ enum Way {
     OneByOne,
 }
 
-impl<'m, Q: Together<'m>, A> Kernel for Batch<'_, 'm, Q, A> {
+impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
     type Output = ();
 
     #[inline(always)]
     fn run<S: Simd>(mut self, s: S) {
         if !S::FLIES {
-            let Batch { block, rays, answers, question, keep, .. } = self;
-            return ask_each(block.whole, rays, answers, question, keep);
+            let Batch { block, rays, answers, question, .. } = self;
+            return ask_each(block.whole, rays, answers, question);
         }
         let count = self.rays.len().min(self.answers.len());
         let mut first = 0;
@@ -94,7 +110,7 @@ impl<'m, Q: Together<'m>, A> Kernel for Batch<'_, 'm, Q, A> {
     }
 }
 
-impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
+impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Where the packet that begins with the ray `first` ends, or else where the next one begins.
     #[inline(always)]
     fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (Option<Alike>, usize) {
@@ -116,8 +132,8 @@ impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
             Way::Stream => self.stream(s),
             Way::InFlight => self.fly(s),
             Way::OneByOne => {
-                let Batch { block, rays, answers, question, keep, .. } = self;
-                ask_each(block.whole, rays, answers, question, keep);
+                let Batch { block, rays, answers, question, .. } = self;
+                ask_each(block.whole, rays, answers, question);
             }
         }
     }
@@ -153,16 +169,16 @@ impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
     /// The rays from `first` to `end`.
     #[inline(always)]
     fn part(&mut self, first: usize, end: usize) -> Batch<'_, 'm, Q, A> {
-        let Batch { block, bundles, rays, question, keep, .. } = *self;
+        let Batch { block, bundles, rays, question, .. } = *self;
         let (rays, answers) = (&rays[first..end], &mut self.answers[first..end]);
-        Batch { block, bundles, rays, answers, question, keep }
+        Batch { block, bundles, rays, answers, question }
     }
 
     /// Writes the answer of a ray.
     #[inline(always)]
     fn write(&mut self, number: usize, answer: Q::Answer) {
         if let Some(place) = self.answers.get_mut(number) {
-            *place = (self.keep)(answer);
+            *place = A::of(answer);
         }
     }
 

@@ -1,16 +1,16 @@
 //! Rays that are alike: as one thick ray through the bundles, and side by side through the leaves.
 
-use super::Batch;
+use super::{Batch, Record};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, block_ref};
 use crate::bvh::{Columns, ENOUGH_ROOM, Walk};
 use crate::math::rounding::{f32_above, f32_below};
-use crate::prim::Leaves;
+use crate::prim::{Lanes, Leaves};
 use crate::query::Query;
 use crate::ray::{Alike, GROUPS, RayPacket, Sixteen, WideBoxes};
 use crate::sieve::{Aim, Found, Opened, Sheared};
-use crate::simd::{Lanes, Scalar, Simd, Width};
-use crate::trace::Together;
+use crate::simd::{Lanes as _, Scalar, Simd, Width};
+use crate::trace::{Firsts, Together};
 
 /// Rays on their way together.
 ///
@@ -22,16 +22,15 @@ struct Company<'a, 'm, Q: Together<'m>, A> {
     packet: RayPacket,
     /// One bit for each ray that met something, or that is answered.
     met: [u32; GROUPS],
-    /// What it met, before all others so far: a leaf block and one lane of it.
-    blocks: [[u32; 16]; GROUPS],
-    lanes: [[u32; 16]; GROUPS],
+    /// What it met, before all others so far.
+    firsts: [Firsts; GROUPS],
     /// Below its depth; the packet knows what is above.
     near: [Sixteen; GROUPS],
     /// All bits, unless some primitives are left out: then each is asked for alone.
     trusted: u32,
 }
 
-impl<'m, Q: Together<'m>, A> Batch<'_, 'm, Q, A> {
+impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Traces rays that are alike, 16 for each of the [groups](GROUPS) at most.
     #[inline(always)]
     pub(super) fn trace_together<S: Simd>(self, s: S, alike: Alike) {
@@ -39,19 +38,18 @@ impl<'m, Q: Together<'m>, A> Batch<'_, 'm, Q, A> {
             leaves: Leaves::of(self.block),
             packet: RayPacket::new(alike),
             met: [0; GROUPS],
-            blocks: [[0; 16]; GROUPS],
-            lanes: [[0; 16]; GROUPS],
+            firsts: [Firsts::NONE; GROUPS],
             near: [[f32::INFINITY; 16]; GROUPS],
             trusted: if self.question.sees_all() { u32::MAX } else { 0 },
             batch: self,
         };
         let sound = company.packet.set(s, company.batch.rays);
         company.descend(s);
-        company.settle(sound);
+        company.settle(s, sound);
     }
 }
 
-impl<'m, Q: Together<'m>, A> Company<'_, 'm, Q, A> {
+impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
     #[inline(always)]
     fn descend<S: Simd>(&mut self, s: S) {
         let (mut columns, mut room) = (Columns::<ENOUGH_ROOM>::UNWRITTEN, [[[0.0; 16]; 2]; 16]);
@@ -146,8 +144,8 @@ impl<'m, Q: Together<'m>, A> Company<'_, 'm, Q, A> {
                 (found.clear, found.candidates & !found.clear)
             };
             self.met[group] |= taken;
-            s.set_words(taken, block, &mut self.blocks[group]);
-            s.set_words(taken, 1 << lane, &mut self.lanes[group]);
+            s.set_words(taken, block, &mut self.firsts[group].blocks);
+            s.set_words(taken, 1 << lane, &mut self.firsts[group].lanes);
             self.fetch_id(s, opened.block.first.wrapping_add(lane));
             if doubt != 0 {
                 self.ask_alone(group, doubt, LeafRef { block, lanes: 1 << lane });
@@ -213,8 +211,8 @@ impl<'m, Q: Together<'m>, A> Company<'_, 'm, Q, A> {
                     * f64::from(self.packet.alike.scale);
                 let (near, far) = (t.near * rate, t.far * rate);
                 self.met[group] |= 1 << lane;
-                self.blocks[group][lane] = leaf.block;
-                self.lanes[group][lane] = leaf.lanes;
+                self.firsts[group].blocks[lane] = leaf.block;
+                self.firsts[group].lanes[lane] = leaf.lanes;
                 self.near[group][lane] = f32_below(near - near.abs() * 1e-12);
                 self.packet.group(group).high[lane] = f32_above(far + far.abs() * 1e-12);
             }
@@ -225,29 +223,31 @@ impl<'m, Q: Together<'m>, A> Company<'_, 'm, Q, A> {
     #[inline(always)]
     fn leaf(&self, group: usize, lane: usize) -> Option<LeafRef> {
         let met = Q::Query::ORDERED && self.met[group] >> lane & 1 == 1;
-        let leaf = LeafRef { block: self.blocks[group][lane], lanes: self.lanes[group][lane] };
-        met.then_some(leaf)
+        met.then_some(self.firsts[group].leaf(lane))
     }
 
     /// Writes the answers. Rays that are not `sound` are not in the packet.
     #[inline(always)]
-    fn settle(&mut self, sound: [u32; GROUPS]) {
+    fn settle<S: Simd>(&mut self, s: S, sound: [u32; GROUPS]) {
+        let Company { batch, firsts, met, packet, .. } = self;
+        let mut unsettled = [0; GROUPS];
         for (group, sound) in sound.into_iter().enumerate() {
-            for lane in 0..16 {
-                let number = 16 * group + lane;
-                let Some(ray) = self.batch.rays.get(number) else { return };
-                if sound >> lane & 1 == 0 {
-                    self.batch.answer_alone(number);
-                } else if self.met[group] >> lane & 1 == 0 {
-                    self.batch.write(number, Q::nothing());
-                } else {
-                    let leaf =
-                        LeafRef { block: self.blocks[group][lane], lanes: self.lanes[group][lane] };
-                    match Q::of_sure(self.batch.block, ray, leaf) {
-                        Some(answer) => self.batch.write(number, answer),
-                        None => self.settle_alone(number, leaf),
-                    }
-                }
+            let first = 16 * group;
+            let there = batch.rays.len().saturating_sub(first).min(16);
+            let (met, there) = (met[group] & sound, (1 << there) - 1);
+            for lane in Lanes(sound & !met) {
+                batch.write(first + lane, Q::nothing());
+            }
+            for lane in Lanes(there & !sound) {
+                batch.answer_alone(first + lane);
+            }
+            let block = batch.block;
+            let write = |lane, answer| batch.write(first + lane, answer);
+            unsettled[group] = Q::settle(s, block, packet.group(group), &firsts[group], met, write);
+        }
+        for (group, unsettled) in unsettled.into_iter().enumerate() {
+            for lane in Lanes(unsettled) {
+                self.settle_alone(16 * group + lane, self.firsts[group].leaf(lane));
             }
         }
     }

@@ -3,7 +3,7 @@
 //! What is computed for one of them waits for nothing of another, so the processor works on several at once, and
 //! guesses wrong once a bundle instead of once a ray. Sources: \[Tsa09\], \[Bar14\].
 
-use super::Batch;
+use super::{Batch, Record};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::bvh::{SharedStack, fetch};
 use crate::prim::{Lanes, Leaves};
@@ -27,7 +27,7 @@ impl<Q> Member<Q> {
     const NONE: Self = Member { ray: PreparedRay::BLANK, slab: NarrowSlab::BLANK, query: None };
 }
 
-impl<'m, Q: Question<'m> + Copy, A> Batch<'_, 'm, Q, A> {
+impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Traces rays that have little more in common than where they begin.
     #[inline(always)]
     pub(super) fn stream<S: Simd>(mut self, s: S) {

@@ -78,7 +78,8 @@ impl SharedStack {
         while let Some(last) = self.count.checked_sub(1) {
             self.count = last;
             // SAFETY: both ways to push write both words of the entries that they count.
-            let [child, rays] = [self.refs[last], self.rays[last]].map(|x| unsafe { x.assume_init() });
+            let [child, rays] =
+                [self.refs[last], self.rays[last]].map(|x| unsafe { x.assume_init() });
             if rays & wanted != 0 {
                 return (ChildRef(child), rays & wanted);
             }

@@ -169,7 +169,12 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
 ///
 /// Without a branch on what it is, which would be guessed wrong; spheres are fetched in vain.
 #[inline(always)]
-pub(crate) fn fetch<S: Simd, const W: usize>(s: S, bundles: &[Bundle<W>], leaves: &Leaves, child: ChildRef) {
+pub(crate) fn fetch<S: Simd, const W: usize>(
+    s: S,
+    bundles: &[Bundle<W>],
+    leaves: &Leaves,
+    child: ChildRef,
+) {
     let (leaf, (_, block)) = (child.is_leaf(), child.leaf_block());
     let block = block.min(leaves.triangle_blocks.len());
     let block = leaves.triangle_blocks.as_ptr().wrapping_add(block).cast::<u8>();

@@ -3,5 +3,6 @@
 
 #[cfg(test)]
 mod bounds;
+pub(crate) mod plane;
 pub(crate) mod sphere;
 pub(crate) mod triangle;

@@ -2,8 +2,9 @@
 
 use glam::DVec3;
 
+use super::plane::PlaneMeeting;
 use crate::exact::{self, Distance, Line, Meeting};
-use crate::math::rounding::{UNIT, UNIT32, gamma};
+use crate::math::rounding::{UNIT32, gamma};
 use crate::math::{sum_abs, wide};
 
 /// Where a ray's line meets a triangle.
@@ -116,43 +117,17 @@ fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Feature> {
     })
 }
 
-/// A triangle as its first vertex and what is computed from it.
-struct Spanned {
-    /// From the line's origin to the first vertex.
-    to_plane: DVec3,
-    e1: DVec3,
-    e2: DVec3,
-    n: DVec3,
-    d: DVec3,
-    /// The line's direction along the normal.
-    along: f64,
-}
-
-impl Spanned {
-    #[inline(always)]
-    fn new(line: &Line, triangle: [[f32; 3]; 3]) -> Self {
-        let [a, b, c] = triangle.map(wide);
-        let d = wide(line.direction);
-        let (e1, e2) = (b - a, c - a);
-        let n = e1.cross(e2);
-        Spanned { to_plane: a - wide(line.origin), e1, e2, n, d, along: d.dot(n) }
-    }
-
-    /// The weights of the second and the third vertex where the line meets the plane; 0 when they cannot be told.
-    ///
-    /// Source: \[MT97\].
-    #[inline(always)]
-    fn weights(&self) -> [f64; 2] {
-        let aside = self.to_plane.cross(self.d);
-        let [u, v] = [self.e2.dot(aside), -self.e1.dot(aside)];
-        if self.along == 0.0 { [0.0; 2] } else { [u / self.along, v / self.along] }
-    }
-}
-
 /// The weights of the second and the third vertex where the line meets the triangle, by the same operations
 /// whatever decided that it does; 0 when they cannot be told.
 pub(crate) fn weights(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 2] {
-    Spanned::new(line, triangle).weights()
+    let PlaneMeeting { weights, along, .. } = plane_meeting(line, triangle);
+    if along == 0.0 { [0.0; 2] } else { weights }
+}
+
+#[inline(always)]
+fn plane_meeting(line: &Line, triangle: [[f32; 3]; 3]) -> PlaneMeeting<f64> {
+    let wide = |p: [f32; 3]| p.map(f64::from);
+    PlaneMeeting::new(wide(line.origin), wide(line.direction), triangle.map(wide))
 }
 
 /// The meeting of the line with the triangle's plane: all that is left to ask for a line that surely
@@ -164,20 +139,12 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
 /// The same, or `None` where the plane is nearly parallel to the line.
 #[inline(always)]
 pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    let spanned = Spanned::new(line, triangle);
-    let Spanned { to_plane, e1, e2, n, d, along } = spanned;
-    // Four roundings in `n`, one in `to_plane`, three in either dot product.
-    let size = gamma(8) * sum_abs(e1) * sum_abs(e2);
-    let along_error = sum_abs(d) * size;
-    if !(1024.0 * along_error < along.abs()) {
+    let PlaneMeeting { t, t_error, weights, along, clear } = plane_meeting(line, triangle);
+    if clear == 0 {
         return None;
     }
-    let t = to_plane.dot(n) / along;
-    let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
-    // A hundredth for the divisor's own error, and the roundings of the quotient.
-    let t_error = 1.01 * t_error + 3.0 * UNIT * t.abs();
-    let (weights, front) = (spanned.weights(), along < 0.0);
-    Some(TriangleMeeting { t, t_error, weights, front, exact: false, feature: Feature::Face })
+    let (exact, feature) = (false, Feature::Face);
+    Some(TriangleMeeting { t, t_error, weights, front: along < 0.0, exact, feature })
 }
 
 /// The meeting with the plane, without error.

@@ -5,9 +5,11 @@ use core::cmp::Ordering;
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, block_ref};
 use crate::exact::{Distance, Line, Meeting};
+use crate::interval::plane::PlaneMeeting;
 use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
-use crate::ray::{Interval, PreparedRay, Ray};
+use crate::ray::{Interval, PreparedRay};
+use crate::simd::{Doubles, Lanes, Simd, Width};
 
 /// Hit or miss, the primitive and the order of real arithmetic; `t` correctly rounded.
 #[derive(Clone, Copy)]
@@ -164,14 +166,41 @@ impl ExactMemory {
     }
 }
 
+/// What [`Exact::of_sure`] finds.
+pub(crate) struct SureMeetings {
+    /// One bit for each of which the rest is what is answered.
+    pub sure: u32,
+    pub t: [f32; 8],
+    pub weights: [[f32; 8]; 2],
+}
+
 impl Exact {
-    /// The answered `t` and weights of a triangle that the ray surely meets within its limits; `None` when that takes more
-    /// than a look.
+    /// What is answered of triangles that rays surely meet within their limits, eight of each: origin and direction of the
+    /// rays, and the coordinates of the triangles' corners, side by side.
     #[inline(always)]
-    pub fn of_sure(ray: &Ray, corners: [[f32; 3]; 3]) -> Option<(f32, [f32; 2])> {
-        let meeting = triangle::clear_plane(&ray.line(), corners)?;
-        let t = surely_rounded(interval(meeting.t, meeting.t_error), meeting.t)?;
-        Some((t, clamped_weights(meeting.weights.map(|weight| weight as f32))))
+    pub fn of_sure<S: Simd>(s: S, line: [&[f32; 8]; 6], corners: &[[f32; 8]; 9]) -> SureMeetings {
+        let [ox, oy, oz, dx, dy, dz] = line;
+        let origin = [s.widened(ox), s.widened(oy), s.widened(oz)];
+        let direction = [s.widened(dx), s.widened(dy), s.widened(dz)];
+        let [ax, ay, az, bx, by, bz, cx, cy, cz] = corners;
+        let a = [s.widened(ax), s.widened(ay), s.widened(az)];
+        let b = [s.widened(bx), s.widened(by), s.widened(bz)];
+        let c = [s.widened(cx), s.widened(cy), s.widened(cz)];
+        let PlaneMeeting { t, t_error, weights, clear, .. } =
+            PlaneMeeting::new(origin, direction, [a, b, c]);
+        let margin = t_error.times(MARGIN);
+        let nearest = s.load(&s.narrowed(t));
+        let (near, far) = (s.load(&s.narrowed(t.sub(margin))), s.load(&s.narrowed(t.add(margin))));
+        let (zero, one) = (Width::<8>::splat(s, 0.0), Width::<8>::splat(s, 1.0));
+        let u = s.load(&s.narrowed(weights[0])).max(zero).min(one).add(zero);
+        let v = s.load(&s.narrowed(weights[1])).max(zero).min(one.sub(u)).add(zero);
+        let mut met = SureMeetings { sure: clear, t: [0.0; 8], weights: [[0.0; 8]; 2] };
+        // Nothing of an interval is below its middle, or above, by less than rounding.
+        met.sure &= nearest.less_or_equal(near) & far.less_or_equal(nearest);
+        nearest.add(zero).store(&mut met.t);
+        u.store(&mut met.weights[0]);
+        v.store(&mut met.weights[1]);
+        met
     }
 
     /// The meetings with a sphere stored at `place` that lie within the limits, entering and leaving.
@@ -309,10 +338,13 @@ fn unclear(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
     }
 }
 
+/// A part of the error more, for the arithmetic of the error.
+const MARGIN: f64 = 1.01;
+
 /// See [`ExactMet::interval`].
 #[inline(always)]
 fn interval(t: f64, t_error: f64) -> Interval<f64> {
-    let margin = 1.01 * t_error;
+    let margin = MARGIN * t_error;
     Interval { near: t - margin, far: t + margin }
 }
 

@@ -11,7 +11,7 @@ mod options;
 mod watertight;
 
 pub(crate) use ask::{Any, Closest, Locate, Wanted};
-pub(crate) use exact::{Exact, ExactMet};
+pub(crate) use exact::{Exact, ExactMet, SureMeetings};
 pub(crate) use hits::NextHits;
 pub(crate) use options::shares_bit;
 pub(crate) use options::{Choice, Filter, flat_number, geometry_of};

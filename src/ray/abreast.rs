@@ -15,6 +15,8 @@ pub(crate) type Sixteen = [f32; 16];
 /// `t` times the size of that component is in the frame. Across it, a ray moves by its `slope` for each unit of
 /// depth. As the direction is divided by its own component, no bound depends on how long it is.
 pub(crate) struct Abreast {
+    /// The rays as they were given: origin, `t_min`, direction, `t_max`.
+    given: [Sixteen; 8],
     /// The origins along the axes x, y and depth of the frame; depths grow along the rays.
     pub origin: [Sixteen; 3],
     pub slope: [Sixteen; 2],
@@ -35,6 +37,7 @@ pub(crate) struct Abreast {
 impl Abreast {
     /// Without rays.
     pub const EMPTY: Self = Abreast {
+        given: [[0.0; 16]; 8],
         origin: [[0.0; 16]; 3],
         slope: [[0.0; 16]; 2],
         blur: [0.0; 16],
@@ -51,14 +54,12 @@ impl Abreast {
     #[inline(always)]
     pub fn set<S: Width<16>>(&mut self, s: S, alike: &Alike, rays: &[Ray]) -> u32 {
         let Some(first) = rays.first() else { return 0 };
-        let mut columns = [[0.0; 16]; 8];
-        for lane in 0..16 {
-            let [o, d] = rays.get(lane).unwrap_or(first).rows();
-            for (column, x) in columns.iter_mut().zip(o.into_iter().chain(d)) {
-                column[lane] = x;
-            }
+        let mut rows = [first.row(); 16];
+        for (row, ray) in rows.iter_mut().zip(rays) {
+            *row = ray.row();
         }
-        let [x, y, z, t_min, dx, dy, dz, t_max] = &columns;
+        self.given = s.columns(&rows);
+        let [x, y, z, t_min, dx, dy, dz, t_max] = &self.given;
         let origin = [s.load(x), s.load(y), s.load(z)];
         let direction = [s.load(dx), s.load(dy), s.load(dz)];
         let limits = [s.load(t_min), s.load(t_max)];
@@ -144,6 +145,17 @@ impl Abreast {
             far = s.splat(last[k]).fast_mul_sub(r, far_shift).min(far);
         }
         near.less_or_equal(far)
+    }
+
+    /// Origins and directions as they were given, eight from lane `first` on.
+    #[inline(always)]
+    pub fn lines(&self, first: usize) -> [&[f32; 8]; 6] {
+        const NOTHING: &[f32; 8] = &[0.0; 8];
+        let half = |k: usize| {
+            let (halves, _) = self.given[k].as_chunks::<8>();
+            halves.get(first / 8).unwrap_or(NOTHING)
+        };
+        [half(0), half(1), half(2), half(4), half(5), half(6)]
     }
 
     /// Nothing is of interest to these rays any more.

@@ -33,7 +33,7 @@ impl Alike {
     /// What the first of these rays have in common, and how many these are: 16, 32, 48 or 64, or all; `None` if not even 16 had better
     /// go together. `reach` is the largest coordinate of the scene.
     #[inline(always)]
-    pub fn first_of<S: Width<4>>(s: S, rays: &[Ray], reach: f32) -> Option<(Self, usize)> {
+    pub fn first_of<S: Width<8>>(s: S, rays: &[Ray], reach: f32) -> Option<(Self, usize)> {
         let mut known = None;
         let mut extremes: Option<Extremes<S::V>> = None;
         let mut count = 0;
@@ -48,7 +48,9 @@ impl Alike {
 
     /// What rays have in common whose numbers lie within these.
     #[inline(always)]
-    fn within([o_least, o_most, d_least, d_most]: [[f32; 4]; 4], reach: f32) -> Option<Self> {
+    fn within([least, most]: [[f32; 8]; 2], reach: f32) -> Option<Self> {
+        let ([o_least, d_least], [o_most, d_most]) =
+            ([&least[..3], &least[4..7]], [&most[..3], &most[4..7]]);
         let (mut apart, mut asunder, mut longest, mut depth) = (0f32, 0f32, 0f32, 0);
         let (mut farthest, mut one_way) = (reach, true);
         for k in 0..3 {
@@ -80,34 +82,28 @@ impl Alike {
     }
 }
 
-/// The least and the largest components of origins, and those of directions; a NaN is left out.
+/// The least and the largest numbers of rays, as in a [row](Ray::row); a NaN is left out.
 #[derive(Clone, Copy)]
-struct Extremes<V>([V; 4]);
+struct Extremes<V>([V; 2]);
 
-impl<V: Lanes<4>> Extremes<V> {
+impl<V: Lanes<8>> Extremes<V> {
     /// Of these rays, and of those `before`.
     #[inline(always)]
-    fn of<S: Width<4, V = V>>(s: S, rays: &[Ray], before: Option<Self>) -> Option<Self> {
-        let [o, d] = rays.first()?.rows();
-        let (o, d) = (s.load(&o), s.load(&d));
-        let Extremes([mut o_least, mut o_most, mut d_least, mut d_most]) =
-            before.unwrap_or(Extremes([o, o, d, d]));
+    fn of<S: Width<8, V = V>>(s: S, rays: &[Ray], before: Option<Self>) -> Option<Self> {
+        let first = s.load(rays.first()?.row());
+        let Extremes([mut least, mut most]) = before.unwrap_or(Extremes([first, first]));
         for ray in rays {
-            let [o, d] = ray.rows();
-            let (o, d) = (s.load(&o), s.load(&d));
-            (o_least, o_most) = (o.min(o_least), o.max(o_most));
-            (d_least, d_most) = (d.min(d_least), d.max(d_most));
+            let row = s.load(ray.row());
+            (least, most) = (row.min(least), row.max(most));
         }
-        Some(Extremes([o_least, o_most, d_least, d_most]))
+        Some(Extremes([least, most]))
     }
 
     #[inline(always)]
-    fn stored(&self) -> [[f32; 4]; 4] {
-        let mut extremes = [[0.0; 4]; 4];
+    fn stored(&self) -> [[f32; 8]; 2] {
+        let mut extremes = [[0.0; 8]; 2];
         self.0[0].store(&mut extremes[0]);
         self.0[1].store(&mut extremes[1]);
-        self.0[2].store(&mut extremes[2]);
-        self.0[3].store(&mut extremes[3]);
         extremes
     }
 }

@@ -47,6 +47,14 @@ impl Ray {
         Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
     }
 
+    /// Its numbers as they are drawn above.
+    #[allow(unsafe_code, reason = "a promise about the layout drawn here")]
+    #[inline(always)]
+    pub(crate) fn row(&self) -> &[f32; 8] {
+        // SAFETY: eight floats in C's order, without padding as they fill its 32 bytes.
+        unsafe { &*core::ptr::from_ref(self).cast() }
+    }
+
     /// Its halves, each a vector on most machines.
     #[inline(always)]
     pub(crate) fn rows(&self) -> [[f32; 4]; 2] {

@@ -12,6 +12,8 @@ mod macros;
 #[macro_use]
 #[allow(unused_macros, dead_code, reason = "as above")]
 mod doubled;
+#[macro_use]
+mod doubles;
 /// What this processor has: `detect` and `run_with`. With `--cfg raykern_portable` nothing but [`Scalar`], which compiles
 /// in a fraction of the time.
 #[cfg_attr(all(not(raykern_portable), target_arch = "x86_64"), path = "x86/mod.rs")]
@@ -36,6 +38,7 @@ mod tests;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, Ordering};
 
+pub(crate) use doubles::Doubles;
 pub(crate) use scalar::Scalar;
 
 /// `N` floats side by side.
@@ -113,6 +116,12 @@ pub(crate) trait Width<const N: usize>: Copy {
         }
     }
 
+    /// Columns of eight rows of numbers each: lane `i` of column `k` is `rows[i][k]`.
+    #[inline(always)]
+    fn columns(self, rows: &[&[f32; 8]; N]) -> [[f32; N]; 8] {
+        core::array::from_fn(|k| core::array::from_fn(|i| rows[i][k]))
+    }
+
     /// Sets the bits of `bits` in the words of `mask`.
     #[inline(always)]
     fn add_to_words(self, mask: u32, bits: u32, words: &mut [u32; N]) {
@@ -174,6 +183,15 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// Whether batches trace rays together and keep several in flight: where vectors are fast enough to wait for memory. Elsewhere it
     /// would only be one more copy of the code.
     const FLIES: bool = false;
+
+    /// Eight doubles.
+    type Doubles: Doubles;
+
+    /// Floats as doubles.
+    fn widened(self, floats: &[f32; 8]) -> Self::Doubles;
+
+    /// The floats nearest to doubles.
+    fn narrowed(self, doubles: Self::Doubles) -> [f32; 8];
 
     /// In the first three lanes the largest of them; any number if one is NaN.
     #[inline(always)]

@@ -63,6 +63,8 @@ impl Simd for Neon {
     // As with SSE2; not measured here.
     const FEW: u32 = 3;
 
+    doubles_one_by_one!();
+
     #[inline(always)]
     fn corners(self, table: Two<Two<F4>>, list: &[u8; 8]) -> Two<Two<F4>> {
         let Two(Two(a, b), Two(c, d)) = table;

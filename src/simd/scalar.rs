@@ -220,6 +220,8 @@ impl<const N: usize> Width<N> for Scalar {
 impl Simd for Scalar {
     const FEW: u32 = 8;
 
+    doubles_one_by_one!();
+
     #[inline(always)]
     fn corners(self, table: [f32; 16], list: &[u8; 8]) -> [f32; 16] {
         core::array::from_fn(|i| table[corner(list, i)])

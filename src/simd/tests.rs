@@ -88,6 +88,10 @@ fn masked<S: Width<16>>(s: S, input: &Input) {
     s.set_words(mask, 7, &mut words);
     Scalar.set_words(mask, 7, &mut expected);
     assert_eq!(words, expected, "set_words {mask:x}");
+    let rows = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|i| a[i..].first_chunk::<8>().expect("eight"));
+    let rows = core::array::from_fn(|i| rows[i * 5 % 9]);
+    let bits = |table: [[f32; 16]; 8]| table.map(|column| column.map(f32::to_bits));
+    assert_eq!(bits(s.columns(&rows)), bits(Scalar.columns(&rows)), "columns");
     s.add_to_words(mask, 1 << 20, &mut words);
     Scalar.add_to_words(mask, 1 << 20, &mut expected);
     assert_eq!(words, expected, "add_to_words {mask:x}");

@@ -40,6 +40,8 @@ impl Simd for Simd128 {
     // As with SSE2; not measured here.
     const FEW: u32 = 3;
 
+    doubles_one_by_one!();
+
     #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
         kernel.run(self)

@@ -8,6 +8,7 @@
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
+use super::doubles::D44;
 use super::sort;
 use super::sse2::F4;
 use crate::simd::doubled::{Two, halves};
@@ -78,6 +79,29 @@ doubled! {
             _mm256_maskstore_epi32(words, lanes_of(mask), all);
             _mm256_maskstore_epi32(words.add(8), lanes_of(mask >> 8), all);
         }
+    }
+
+    #[inline(always)]
+    fn columns(self, rows: &[&[f32; 8]; 16]) -> [[f32; 16]; 8] {
+        let mut columns = [[0.0; 16]; 8];
+        for half in [0, 8] {
+            // SAFETY: the token proves AVX2; a row has eight floats, half a column too.
+            unsafe {
+                let mut loaded = [_mm256_setzero_ps(); 8];
+                for (i, row) in loaded.iter_mut().enumerate() {
+                    *row = _mm256_loadu_ps(rows[half + i].as_ptr());
+                }
+                let [a, b, c, d, e, f, g, h] = loaded;
+                let (first, last) = (in_halves([a, b, c, d]), in_halves([e, f, g, h]));
+                for k in 0..4 {
+                    let low = _mm256_permute2f128_ps::<0x20>(first[k], last[k]);
+                    let high = _mm256_permute2f128_ps::<0x31>(first[k], last[k]);
+                    _mm256_storeu_ps(columns[k].as_mut_ptr().add(half), low);
+                    _mm256_storeu_ps(columns[k + 4].as_mut_ptr().add(half), high);
+                }
+            }
+        }
+        columns
     }
 
     #[inline(always)]
@@ -189,6 +213,26 @@ unsafe fn lanes_of(mask: u32) -> __m256i {
     }
 }
 
+/// The columns of four rows, in each half of a vector by itself.
+///
+/// # Safety
+///
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn in_halves([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (ab, cd) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+        let (ab_high, cd_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+        [
+            _mm256_shuffle_ps::<0x44>(ab, cd),
+            _mm256_shuffle_ps::<0xEE>(ab, cd),
+            _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
+            _mm256_shuffle_ps::<0xEE>(ab_high, cd_high),
+        ]
+    }
+}
+
 /// Of 16 lanes the eight with these numbers, in the four lowest bits.
 ///
 /// # Safety
@@ -212,6 +256,19 @@ const SHIFTS: [i32; 8] = [0, 0, 4, 4, 8, 8, 12, 12];
 impl Simd for Avx2 {
     const FEW: u32 = 0;
     const FLIES: bool = true;
+
+    type Doubles = D44;
+
+    #[inline(always)]
+    fn widened(self, floats: &[f32; 8]) -> D44 {
+        // SAFETY: the token proves that the instructions exist.
+        unsafe { D44::widened(floats) }
+    }
+
+    #[inline(always)]
+    fn narrowed(self, doubles: D44) -> [f32; 8] {
+        doubles.narrowed()
+    }
 
     #[inline(always)]
     fn corners(self, table: Two<F8>, list: &[u8; 8]) -> Two<F8> {

@@ -9,6 +9,7 @@ use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
 use super::avx2::F8;
+use super::doubles::D8;
 use super::sort;
 use super::sse2::F4;
 use crate::simd::{Kernel, Lanes, Simd, Width};
@@ -80,6 +81,31 @@ width! {
             let all = _mm512_set1_epi32(word as i32);
             _mm512_mask_storeu_epi32(words.as_mut_ptr().cast(), mask as __mmask16, all);
         }
+    }
+
+    #[inline(always)]
+    fn columns(self, rows: &[&[f32; 8]; 16]) -> [[f32; 16]; 8] {
+        let mut columns = [[0.0; 16]; 8];
+        // SAFETY: the token proves AVX-512 F and DQ; a row has eight floats, a column sixteen.
+        unsafe {
+            // Rows 0 to 3 beside rows 4 to 7, and then 8 to 11 beside 12 to 15.
+            let mut pairs = [_mm512_setzero_ps(); 8];
+            for (i, pair) in pairs.iter_mut().enumerate() {
+                let first = i + i / 4 * 4;
+                let low = _mm256_loadu_ps(rows[first].as_ptr());
+                let high = _mm256_loadu_ps(rows[first + 4].as_ptr());
+                *pair = _mm512_insertf32x8::<1>(_mm512_castps256_ps512(low), high);
+            }
+            let [a, b, c, d, e, f, g, h] = pairs;
+            let (first, last) = (in_quarters([a, b, c, d]), in_quarters([e, f, g, h]));
+            for k in 0..4 {
+                let low = _mm512_shuffle_f32x4::<0x88>(first[k], last[k]);
+                let high = _mm512_shuffle_f32x4::<0xDD>(first[k], last[k]);
+                _mm512_storeu_ps(columns[k].as_mut_ptr(), low);
+                _mm512_storeu_ps(columns[k + 4].as_mut_ptr(), high);
+            }
+        }
+        columns
     }
 
     #[inline(always)]
@@ -174,6 +200,26 @@ width! {
     }
 }
 
+/// The columns of four rows, in each quarter of a vector by itself.
+///
+/// # Safety
+///
+/// The processor has AVX-512 F.
+#[inline(always)]
+unsafe fn in_quarters([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (ab, cd) = (_mm512_unpacklo_ps(a, b), _mm512_unpacklo_ps(c, d));
+        let (ab_high, cd_high) = (_mm512_unpackhi_ps(a, b), _mm512_unpackhi_ps(c, d));
+        [
+            _mm512_shuffle_ps::<0x44>(ab, cd),
+            _mm512_shuffle_ps::<0xEE>(ab, cd),
+            _mm512_shuffle_ps::<0x44>(ab_high, cd_high),
+            _mm512_shuffle_ps::<0xEE>(ab_high, cd_high),
+        ]
+    }
+}
+
 /// Integers in order, the largest first.
 ///
 /// Source: \[Bat68\].
@@ -212,6 +258,19 @@ const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15
 impl Simd for Avx512 {
     const FEW: u32 = 0;
     const FLIES: bool = true;
+
+    type Doubles = D8;
+
+    #[inline(always)]
+    fn widened(self, floats: &[f32; 8]) -> D8 {
+        // SAFETY: the token proves that the instructions exist.
+        unsafe { D8::widened(floats) }
+    }
+
+    #[inline(always)]
+    fn narrowed(self, doubles: D8) -> [f32; 8] {
+        doubles.narrowed()
+    }
 
     #[inline(always)]
     fn corners(self, table: F16, list: &[u8; 8]) -> F16 {

@@ -3,6 +3,7 @@
 mod avx2;
 mod avx512;
 mod detect;
+mod doubles;
 mod sort;
 mod sse2;
 

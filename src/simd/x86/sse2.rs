@@ -25,6 +25,8 @@ doubled!(Sse2 16 of 8 Two<F4>);
 impl Simd for Sse2 {
     const FEW: u32 = 3;
 
+    doubles_one_by_one!();
+
     by_four!();
 
     #[inline(always)]
