@@ -6,7 +6,8 @@ use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place};
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
-use crate::prim::{self, Leaves};
+use crate::math::Bits;
+use crate::prim::Leaves;
 use crate::query::{
     Any, Choice, Closest, Decide, Exact, ExactMet, Filter, Locate, Meets, Query, SureMeetings,
     Wanted, Watch, geometry_of,
@@ -192,7 +193,7 @@ impl<'m, const MEMORY: usize> Together<'m> for ClosestHit<Exact, (), MEMORY> {
             let mut corners = [[0.0; 8]; 9];
             let mut named = [None; 8];
             let mut last = None;
-            for i in prim::Lanes(lanes >> half & 0xFF) {
+            for i in Bits(lanes >> half & 0xFF) {
                 let leaf = firsts.leaf(half + i);
                 let name = match last {
                     Some((known, name)) if known == leaf => name,
@@ -241,7 +242,7 @@ impl<'m> Together<'m> for AnyHit<Exact, ()> {
         lanes: u32,
         mut write: impl FnMut(usize, bool),
     ) -> u32 {
-        for lane in prim::Lanes(lanes) {
+        for lane in Bits(lanes) {
             write(lane, true);
         }
         0

@@ -4,12 +4,13 @@ use super::{Batch, Record};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, block_ref};
 use crate::bvh::{Columns, ENOUGH_ROOM, Walk};
+use crate::math::Bits;
 use crate::math::rounding::{f32_above, f32_below};
-use crate::prim::{Lanes, Leaves};
+use crate::prim::Leaves;
 use crate::query::Query;
 use crate::ray::{Alike, GROUPS, RayPacket, Sixteen, WideBoxes};
 use crate::sieve::{Aim, Found, Opened, Sheared};
-use crate::simd::{Lanes as _, Scalar, Simd, Width};
+use crate::simd::{Lanes, Scalar, Simd, Width};
 use crate::trace::{Firsts, Together};
 
 /// Rays on their way together.
@@ -109,7 +110,10 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             return;
         }
         let Some(triangles) = self.leaves.triangle_blocks.get(number) else { return };
-        let opened = Opened::new(s, &self.packet.alike, triangles);
+        let opened = Opened::new(s, &self.packet.alike, &self.packet.spread, triangles);
+        if opened.lanes == 0 {
+            return;
+        }
         for (group, entered) in entered.into_iter().enumerate() {
             if entered != 0 {
                 self.look(s, group, entered, block, &opened, room);
@@ -235,10 +239,10 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             let first = 16 * group;
             let there = batch.rays.len().saturating_sub(first).min(16);
             let (met, there) = (met[group] & sound, (1 << there) - 1);
-            for lane in Lanes(sound & !met) {
+            for lane in Bits(sound & !met) {
                 batch.write(first + lane, Q::nothing());
             }
-            for lane in Lanes(there & !sound) {
+            for lane in Bits(there & !sound) {
                 batch.answer_alone(first + lane);
             }
             let block = batch.block;
@@ -246,7 +250,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             unsettled[group] = Q::settle(s, block, packet.group(group), &firsts[group], met, write);
         }
         for (group, unsettled) in unsettled.into_iter().enumerate() {
-            for lane in Lanes(unsettled) {
+            for lane in Bits(unsettled) {
                 self.settle_alone(16 * group + lane, self.firsts[group].leaf(lane));
             }
         }

@@ -6,10 +6,11 @@
 use super::{Batch, Record};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::bvh::{SharedStack, fetch};
-use crate::prim::{Lanes, Leaves};
+use crate::math::Bits;
+use crate::prim::Leaves;
 use crate::query::Query;
 use crate::ray::{NarrowSlab, PreparedRay, Slab, WideBoxes};
-use crate::simd::{Lanes as _, Simd, Width};
+use crate::simd::{Lanes, Simd, Width};
 use crate::trace::Question;
 
 /// So many rays go together: one bit of a word each. 64 are no faster.
@@ -42,7 +43,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
             };
             stream.descend(s);
             let ended = rays & !stream.going;
-            for lane in Lanes(rays) {
+            for lane in Bits(rays) {
                 if let Member { ray, query: Some(query), .. } = &mut members[lane % STREAM] {
                     let answer = Q::answer(self.block, ray, query, ended >> lane & 1 == 1);
                     self.write(first + lane, answer);
@@ -114,7 +115,7 @@ impl<Q: Query> Stream<'_, '_, Q> {
     ) -> bool {
         let mut entered = [0; 16];
         let mut least = Width::<16>::splat(s, f32::INFINITY);
-        for lane in Lanes(here) {
+        for lane in Bits(here) {
             let Member { slab, query: Some(query), .. } = &self.members[lane % STREAM] else {
                 continue;
             };
@@ -125,7 +126,7 @@ impl<Q: Query> Stream<'_, '_, Q> {
                 least = Width::<16>::select(s, children, near.min(least), least);
             }
         }
-        for child in Lanes(Width::<16>::used_words(s, &entered)) {
+        for child in Bits(Width::<16>::used_words(s, &entered)) {
             fetch(s, self.bundles, &self.leaves, bundle.refs[child % 16]);
         }
         if Q::ORDERED {
@@ -138,7 +139,7 @@ impl<Q: Query> Stream<'_, '_, Q> {
     /// Offers a leaf to the rays of `here`.
     #[inline(always)]
     fn open<S: Simd>(&mut self, s: S, leaf: ChildRef, here: u32) {
-        for lane in Lanes(here) {
+        for lane in Bits(here) {
             if let Member { ray, query: Some(query), .. } = &mut self.members[lane % STREAM]
                 && self.leaves.intersect_whole(s, leaf.leaf_block(), ray, query)
             {

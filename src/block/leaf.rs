@@ -67,18 +67,6 @@ impl TriangleBlock {
         [a, b, c].map(|list| usize::from(list[byte] >> shift & 15))
     }
 
-    /// No corner has this number of a vertex or a larger one: 1 to 16.
-    #[inline(always)]
-    pub fn corners_below(&self) -> usize {
-        let mut largest = [0; TRIANGLES / 2];
-        for list in &self.corners {
-            for (largest, two) in largest.iter_mut().zip(list) {
-                *largest = (*largest).max(two & 15).max(two >> 4);
-            }
-        }
-        largest.into_iter().fold(0, u8::max) as usize + 1
-    }
-
     /// The lanes that can be hit, one bit each.
     #[inline(always)]
     pub fn lanes(&self) -> u32 {

@@ -14,8 +14,8 @@ use glam::DVec3;
 
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place};
 use crate::math::float::sqrt;
-use crate::math::{Aabb, wide};
-use crate::prim::{Lanes, Leaves};
+use crate::math::{Aabb, Bits, wide};
+use crate::prim::Leaves;
 use crate::query::Filter;
 pub(crate) use image::Image;
 use shape::Foot;
@@ -135,7 +135,7 @@ impl<'m> Nearest<'m> {
             if !self.is_within(self.square_to(&block.aabb)) {
                 return;
             }
-            for lane in Lanes(lanes & block.lanes()) {
+            for lane in Bits(lanes & block.lanes()) {
                 let corners = block.triangle(lane);
                 if self.is_within(self.square_to(&Aabb::around(&corners))) {
                     let corners = corners.map(|corner| self.image.of(corner));
@@ -145,7 +145,7 @@ impl<'m> Nearest<'m> {
             }
         } else if kind == KIND_SPHERES {
             let Some(block) = self.leaves.sphere_blocks.get(number) else { return };
-            for lane in Lanes(lanes & block.lanes()) {
+            for lane in Bits(lanes & block.lanes()) {
                 let (centre, radius) = block.sphere(lane);
                 let foot = self.image.foot_on_sphere(self.world, centre, radius);
                 self.consider(Place::of_lane(number as u32, block.first, lane as u32), foot);

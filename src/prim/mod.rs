@@ -21,7 +21,7 @@ use crate::block::Block;
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock,
 };
-use crate::math::Aabb;
+use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Triangles};
@@ -186,7 +186,7 @@ impl Leaves<'_> {
         query: &mut Q,
     ) -> bool {
         query.watch().block(lanes.count_ones());
-        Lanes(lanes).any(|lane| {
+        Bits(lanes).any(|lane| {
             if Q::OF_INDEX {
                 let place = Place::of_lane(number as u32, block.first, lane as u32);
                 return query.instance(place.prim(self.prim_ids));
@@ -270,18 +270,4 @@ fn consider<Q: Query>(
 #[inline(never)]
 fn is_near(ray: &PreparedRay, block: &TriangleBlock, t_bound: f32) -> bool {
     !WideSlab::new(ray).part(&block.aabb, t_bound).is_empty()
-}
-
-/// The numbers of the bits that are set, from the lowest.
-pub(crate) struct Lanes(pub u32);
-
-impl Iterator for Lanes {
-    type Item = usize;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        let lane = self.0.trailing_zeros();
-        self.0 &= self.0.wrapping_sub(1);
-        (lane < 32).then_some(lane as usize)
-    }
 }

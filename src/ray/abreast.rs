@@ -176,9 +176,12 @@ fn slack<S: Width<16>>(s: S, depth: S::V) -> S::V {
 /// The ends of the intervals in which the numbers of several rays lie.
 pub(super) struct Ends<V> {
     pub reciprocals: [[V; 2]; 3],
+    pub origin: [[V; 2]; 3],
+    pub slope: [[V; 2]; 2],
     pub near_shift: [V; 3],
     pub far_shift: [V; 3],
     pub low: V,
+    pub blur: V,
 }
 
 impl<V: Copy> Ends<V> {
@@ -187,9 +190,12 @@ impl<V: Copy> Ends<V> {
         let (above, below) = (s.splat(f32::INFINITY), s.splat(f32::NEG_INFINITY));
         Ends {
             reciprocals: [[above, below]; 3],
+            origin: [[above, below]; 3],
+            slope: [[above, below]; 2],
             near_shift: [below; 3],
             far_shift: [above; 3],
             low: above,
+            blur: below,
         }
     }
 
@@ -200,12 +206,19 @@ impl<V: Copy> Ends<V> {
         V: Lanes<16>,
     {
         for k in 0..3 {
-            let r = s.load(&rays.reciprocal[k]);
-            let [least, most] = self.reciprocals[k];
-            self.reciprocals[k] = [r.min(least), r.max(most)];
+            widen(&mut self.reciprocals[k], s.load(&rays.reciprocal[k]));
+            widen(&mut self.origin[k], s.load(&rays.origin[k]));
             self.near_shift[k] = s.load(&rays.near_shift[k]).max(self.near_shift[k]);
             self.far_shift[k] = s.load(&rays.far_shift[k]).min(self.far_shift[k]);
         }
+        widen(&mut self.slope[0], s.load(&rays.slope[0]));
+        widen(&mut self.slope[1], s.load(&rays.slope[1]));
         self.low = s.load(&rays.low).min(self.low);
+        self.blur = s.load(&rays.blur).max(self.blur);
     }
+}
+
+#[inline(always)]
+fn widen<V: Lanes<16>>(ends: &mut [V; 2], more: V) {
+    *ends = [more.min(ends[0]), more.max(ends[1])];
 }

@@ -11,7 +11,7 @@ mod slab;
 pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use frame::{Late, PreparedRay, TINY};
-pub(crate) use packet::{GROUPS, RayPacket};
+pub(crate) use packet::{GROUPS, RayPacket, Spread};
 pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".

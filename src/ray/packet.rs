@@ -19,6 +19,16 @@ pub(crate) struct RayPacket {
     near_shift: [f32; 3],
     far_shift: [f32; 3],
     low: f32,
+    pub spread: Spread,
+}
+
+/// Between what the numbers of all rays of a packet lie, in its frame.
+pub(crate) struct Spread {
+    /// Along the axes x, y and depth.
+    pub origin: [[f32; 2]; 3],
+    pub slope: [[f32; 2]; 2],
+    /// What x or y of a sheared vertex may be off at most, for each unit of depth.
+    pub blur: f32,
 }
 
 impl RayPacket {
@@ -32,6 +42,7 @@ impl RayPacket {
             near_shift: [0.0; 3],
             far_shift: [0.0; 3],
             low: 0.0,
+            spread: Spread { origin: [[0.0; 2]; 3], slope: [[0.0; 2]; 2], blur: 0.0 },
         }
     }
 
@@ -46,12 +57,14 @@ impl RayPacket {
             ends.take(s, group);
         }
         for k in 0..3 {
-            let [least, most] = ends.reciprocals[k];
-            self.reciprocals[k] = [least_lane(s, least), s.largest(most)];
+            self.reciprocals[k] = ends_of(s, ends.reciprocals[k]);
+            self.spread.origin[k] = ends_of(s, ends.origin[k]);
             self.near_shift[k] = s.largest(ends.near_shift[k]);
             self.far_shift[k] = least_lane(s, ends.far_shift[k]);
         }
         self.low = least_lane(s, ends.low);
+        self.spread.slope = [ends_of(s, ends.slope[0]), ends_of(s, ends.slope[1])];
+        self.spread.blur = s.largest(ends.blur);
         sound
     }
 
@@ -102,6 +115,11 @@ impl RayPacket {
             s,
         }
     }
+}
+
+#[inline(always)]
+fn ends_of<S: Width<16>>(s: S, [least, most]: [S::V; 2]) -> [f32; 2] {
+    [least_lane(s, least), s.largest(most)]
 }
 
 #[inline(always)]

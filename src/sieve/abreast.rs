@@ -1,11 +1,13 @@
 //! The filter of triangles the other way round: one triangle, and sixteen rays that are alike.
 
 use super::areas::{Across, AreaError, Areas};
+use super::beside::not_beside;
 use super::meetings::{Meetings, Middle};
-use crate::block::leaf::{TRIANGLES, TriangleBlock};
+use crate::block::leaf::TriangleBlock;
+use crate::math::Bits;
 use crate::math::rounding::UNIT32;
-use crate::ray::{Abreast, Alike, Sixteen};
-use crate::simd::{Lanes, Width, mul_sub};
+use crate::ray::{Abreast, Alike, Sixteen, Spread};
+use crate::simd::{Lanes, Simd, Width, mul_sub};
 
 /// A block in the frame of rays that are alike: what is the same for all of them.
 pub(crate) struct Opened<'b> {
@@ -15,20 +17,28 @@ pub(crate) struct Opened<'b> {
     vertices: [Sixteen; 3],
     /// Their depths from the middle of the block's box.
     depths: Sixteen,
+    /// The triangles that do not lie beside all rays, one bit each, and their vertices.
+    pub lanes: u32,
+    used: u32,
 }
 
 impl<'b> Opened<'b> {
     #[inline(always)]
-    pub fn new<S: Width<16>>(s: S, alike: &Alike, block: &'b TriangleBlock) -> Self {
+    pub fn new<S: Simd>(s: S, alike: &Alike, spread: &Spread, block: &'b TriangleBlock) -> Self {
         let (vertices, depths) = ([[0.0; 16]; 3], [0.0; 16]);
-        let mut opened = Opened { block, alike: *alike, vertices, depths };
+        let mut opened = Opened { block, alike: *alike, vertices, depths, lanes: 0, used: 0 };
         let scales = [alike.scale, alike.scale, alike.depth_scale()];
         for (k, scale) in scales.into_iter().enumerate() {
-            let given = s.load(&block.vertices[alike.axes[k]]);
-            given.mul(s.splat(scale)).store(&mut opened.vertices[k]);
+            let given = Width::<16>::load(s, &block.vertices[alike.axes[k]]);
+            given.mul(Width::<16>::splat(s, scale)).store(&mut opened.vertices[k]);
         }
-        let middle = opened.middle(s, s.splat(0.0)).raw;
-        s.load(&opened.vertices[2]).sub(s.splat(middle)).store(&mut opened.depths);
+        let middle = Width::<16>::splat(s, opened.middle(s, Width::<16>::splat(s, 0.0)).raw);
+        s.load(&opened.vertices[2]).sub(middle).store(&mut opened.depths);
+        opened.lanes = not_beside(s, spread, &opened.vertices, block);
+        for i in Bits(opened.lanes) {
+            let [a, b, c] = block.corner_numbers(i);
+            opened.used |= 1 << a | 1 << b | 1 << c;
+        }
         opened
     }
 
@@ -80,7 +90,8 @@ impl<'r, V: Lanes<16>> Aim<'r, V> {
         let middle = opened.middle(s, from_depth);
         let mut size = s.splat(0.0);
         let [xs, ys, depths] = &opened.vertices;
-        for (i, [x_out, y_out]) in room.iter_mut().enumerate().take(opened.block.corners_below()) {
+        for i in Bits(opened.used) {
+            let [x_out, y_out] = &mut room[i % 16];
             let depth = s.splat(depths[i]).sub(from_depth);
             let (x, y) = (s.splat(xs[i]).sub(from_x), s.splat(ys[i]).sub(from_y));
             let x = mul_sub::<V, true, 16>(depth, slope_x, x);
@@ -107,12 +118,12 @@ impl<'r, V: Lanes<16>> Aim<'r, V> {
     #[inline(always)]
     pub fn passed<S: Width<16, V = V>>(&self, s: S, opened: &Opened, lanes: u32) -> u32 {
         let mut passed = 0;
-        for i in 0..TRIANGLES.min(opened.block.count as usize) {
+        for i in Bits(opened.lanes) {
             let corners = self.corners(s, opened.block.corner_numbers(i));
             let areas = Areas::new::<true, 16>(&corners, self.largest_error);
             passed |= u32::from(lanes & !areas.outside(s) != 0) << i;
         }
-        passed & opened.block.lanes()
+        passed
     }
 
     #[inline(always)]

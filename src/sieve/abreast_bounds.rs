@@ -11,7 +11,7 @@ use crate::block::leaf::TriangleBlock;
 use crate::exact::{Line, Meeting};
 use crate::interval;
 use crate::math::Aabb;
-use crate::ray::{Abreast, Alike, Ray};
+use crate::ray::{Alike, Ray, RayPacket};
 use crate::simd::Scalar;
 
 /// A packet of rays from nearly one place, each to somewhere on the triangle or beside it, not far from each other.
@@ -47,17 +47,17 @@ fn packet_is_right(random: &mut Random, worst: &mut Worst) -> Result<u32, u32> {
             column[v] = x;
         }
     }
-    let (mut abreast, mut room) = (Abreast::EMPTY, [[[0.0; 16]; 2]; 16]);
-    let sound = abreast.set(Scalar, &alike, &rays);
+    let (mut packet, mut room) = (RayPacket::new(alike), [[[0.0; 16]; 2]; 16]);
+    let [sound, ..] = packet.set(Scalar, &rays);
     let (mut first, mut last) = (block.aabb.lower, block.aabb.upper);
     for k in 0..3 {
         if alike.backwards[k] {
             (first[k], last[k]) = (last[k], first[k]);
         }
     }
-    let entered = abreast.entered(Scalar, first, last);
-    let opened = Opened::new(Scalar, &alike, &block);
-    let aim = Aim::new(Scalar, &abreast, &opened, &mut room);
+    let entered = packet.group(0).entered(Scalar, first, last);
+    let opened = Opened::new(Scalar, &alike, &packet.spread, &block);
+    let aim = Aim::new(Scalar, packet.group(0), &opened, &mut room);
     let lanes = sound & aim.within(Scalar);
     let passed = aim.passed(Scalar, &opened, lanes) != 0;
     let found = aim.look(Scalar, &opened, 0, lanes);

@@ -4,6 +4,7 @@ mod abreast;
 #[cfg(test)]
 mod abreast_bounds;
 mod areas;
+mod beside;
 #[cfg(test)]
 mod bounds;
 mod detail;

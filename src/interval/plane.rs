@@ -1,0 +1,61 @@
+//! Where lines meet the planes of triangles: one of each, or eight side by side, by the same operations.
+
+use crate::math::rounding::{UNIT, gamma};
+use crate::simd::Doubles;
+
+/// A vector for each lane.
+pub(crate) type Vector<D> = [D; 3];
+
+/// The meeting of a line with a triangle's plane.
+pub(crate) struct PlaneMeeting<D> {
+    pub t: D,
+    /// What `t` may be off, where that is `clear`.
+    pub t_error: D,
+    /// The weights of the second and the third vertex, not yet between 0 and 1; not finite where the plane is parallel.
+    pub weights: [D; 2],
+    /// The line's direction along the normal: negative where it meets the front.
+    pub along: D,
+    /// One bit for each lane, unless the plane is nearly parallel to the line.
+    pub clear: u32,
+}
+
+impl<D: Doubles> PlaneMeeting<D> {
+    /// Source: \[MT97\] for the weights.
+    #[inline(always)]
+    pub fn new(origin: Vector<D>, direction: Vector<D>, [a, b, c]: [Vector<D>; 3]) -> Self {
+        let (to_plane, e1, e2) = (minus(a, origin), minus(b, a), minus(c, a));
+        let n = cross(e1, e2);
+        let along = dot(direction, n);
+        // Four roundings in `n`, one in `to_plane`, three in either dot product.
+        let size = sum_abs(e1).times(gamma(8)).mul(sum_abs(e2));
+        let along_error = sum_abs(direction).mul(size);
+        let clear = along_error.times(1024.0).less(along.abs());
+        let t = dot(to_plane, n).div(along);
+        let t_error = sum_abs(to_plane).mul(size).add(t.abs().mul(along_error)).div(along.abs());
+        // A hundredth for the divisor's own error, and the roundings of the quotient.
+        let t_error = t_error.times(1.01).add(t.abs().times(3.0 * UNIT));
+        let aside = cross(to_plane, direction);
+        let weights = [dot(e2, aside).div(along), dot(e1, aside).neg().div(along)];
+        PlaneMeeting { t, t_error, weights, along, clear }
+    }
+}
+
+#[inline(always)]
+fn minus<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> Vector<D> {
+    [ax.sub(bx), ay.sub(by), az.sub(bz)]
+}
+
+#[inline(always)]
+fn cross<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> Vector<D> {
+    [ay.mul(bz).sub(by.mul(az)), az.mul(bx).sub(bz.mul(ax)), ax.mul(by).sub(bx.mul(ay))]
+}
+
+#[inline(always)]
+fn dot<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> D {
+    ax.mul(bx).add(ay.mul(by)).add(az.mul(bz))
+}
+
+#[inline(always)]
+fn sum_abs<D: Doubles>([x, y, z]: Vector<D>) -> D {
+    x.abs().add(y.abs()).add(z.abs())
+}

@@ -1,0 +1,103 @@
+//! Doubles side by side: what is computed for one is computed for several by the same operations.
+
+/// One double, or eight.
+pub(crate) trait Doubles: Copy {
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    /// Each of them times `factor`.
+    fn times(self, factor: f64) -> Self;
+    fn abs(self) -> Self;
+    fn neg(self) -> Self;
+    /// One bit for each lane in which `self < other`, the first the lowest; none for NaN.
+    fn less(self, other: Self) -> u32;
+}
+
+impl Doubles for f64 {
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self + other
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self - other
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self * other
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self / other
+    }
+
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        self * factor
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::from_bits(self.to_bits() & !(1 << 63))
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        -self
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        u32::from(self < other)
+    }
+}
+
+macro_rules! each {
+    ($($name:ident)*) => {
+        $(
+            fn $name(self, other: Self) -> Self {
+                core::array::from_fn(|i| self[i].$name(other[i]))
+            }
+        )*
+    };
+}
+
+/// Portable: the definition of the others.
+impl Doubles for [f64; 8] {
+    each!(add sub mul div);
+
+    fn times(self, factor: f64) -> Self {
+        self.map(|x| x * factor)
+    }
+
+    fn abs(self) -> Self {
+        self.map(Doubles::abs)
+    }
+
+    fn neg(self) -> Self {
+        self.map(|x| -x)
+    }
+
+    fn less(self, other: Self) -> u32 {
+        (0..8).fold(0, |bits, i| bits | self[i].less(other[i]) << i)
+    }
+}
+
+/// The doubles of a backend that has none of its own.
+macro_rules! doubles_one_by_one {
+    () => {
+        type Doubles = [f64; 8];
+
+        fn widened(self, floats: &[f32; 8]) -> [f64; 8] {
+            floats.map(f64::from)
+        }
+
+        fn narrowed(self, doubles: [f64; 8]) -> [f32; 8] {
+            doubles.map(|x| x as f32)
+        }
+    };
+}

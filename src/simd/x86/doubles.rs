@@ -1,0 +1,159 @@
+//! Eight doubles: one register of AVX-512, or two of AVX2.
+
+#![allow(
+    clippy::multiple_unsafe_ops_per_block,
+    reason = "one proof covers all instructions of an operation"
+)]
+
+use core::arch::x86_64::*;
+
+use crate::simd::doubles::Doubles;
+
+/// In one register of AVX-512: such a value is made from a token, so the instructions exist.
+#[derive(Clone, Copy)]
+pub(super) struct D8(__m512d);
+
+/// In two registers of AVX2, likewise.
+#[derive(Clone, Copy)]
+pub(super) struct D44([__m256d; 2]);
+
+impl D8 {
+    /// # Safety
+    ///
+    /// The processor has AVX-512 F.
+    #[inline(always)]
+    pub unsafe fn widened(floats: &[f32; 8]) -> Self {
+        // SAFETY: the caller's promise; the array has eight floats.
+        D8(unsafe { _mm512_cvtps_pd(_mm256_loadu_ps(floats.as_ptr())) })
+    }
+
+    #[inline(always)]
+    pub fn narrowed(self) -> [f32; 8] {
+        let mut floats = [0.0; 8];
+        // SAFETY: a value of this type proves AVX-512 F; the array has eight floats.
+        unsafe { _mm256_storeu_ps(floats.as_mut_ptr(), _mm512_cvtpd_ps(self.0)) };
+        floats
+    }
+}
+
+impl Doubles for D8 {
+    pairwise! {
+        add: _mm512_add_pd;
+        sub: _mm512_sub_pd;
+        mul: _mm512_mul_pd;
+        div: _mm512_div_pd;
+    }
+
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        // SAFETY: a value of this type proves AVX-512 F.
+        D8(unsafe { _mm512_mul_pd(self.0, _mm512_set1_pd(factor)) })
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        D8(unsafe { _mm512_abs_pd(self.0) })
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: as above, and DQ.
+        D8(unsafe { _mm512_xor_pd(self.0, _mm512_set1_pd(-0.0)) })
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        // SAFETY: as above.
+        unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(self.0, other.0)) }
+    }
+}
+
+/// Operations of one instruction a half.
+macro_rules! in_halves {
+    ($($name:ident: $instruction:ident;)*) => {
+        $(
+            #[inline(always)]
+            fn $name(self, other: Self) -> Self {
+                let ([a, b], [c, d]) = (self.0, other.0);
+                // SAFETY: a value of this type proves AVX2.
+                D44(unsafe { [$instruction(a, c), $instruction(b, d)] })
+            }
+        )*
+    };
+}
+
+impl D44 {
+    /// # Safety
+    ///
+    /// The processor has AVX2.
+    #[inline(always)]
+    pub unsafe fn widened(floats: &[f32; 8]) -> Self {
+        let first = floats.as_ptr();
+        // SAFETY: the caller's promise; the array has eight floats.
+        D44(unsafe {
+            [_mm256_cvtps_pd(_mm_loadu_ps(first)), _mm256_cvtps_pd(_mm_loadu_ps(first.add(4)))]
+        })
+    }
+
+    #[inline(always)]
+    pub fn narrowed(self) -> [f32; 8] {
+        let (mut floats, [low, high]) = ([0.0; 8], self.0);
+        let first: *mut f32 = floats.as_mut_ptr();
+        // SAFETY: a value of this type proves AVX2; the array has eight floats.
+        unsafe {
+            _mm_storeu_ps(first, _mm256_cvtpd_ps(low));
+            _mm_storeu_ps(first.add(4), _mm256_cvtpd_ps(high));
+        }
+        floats
+    }
+}
+
+impl Doubles for D44 {
+    in_halves! {
+        add: _mm256_add_pd;
+        sub: _mm256_sub_pd;
+        mul: _mm256_mul_pd;
+        div: _mm256_div_pd;
+    }
+
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        let [low, high] = self.0;
+        // SAFETY: a value of this type proves AVX2.
+        D44(unsafe {
+            let factor = _mm256_set1_pd(factor);
+            [_mm256_mul_pd(low, factor), _mm256_mul_pd(high, factor)]
+        })
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        let [low, high] = self.0;
+        // SAFETY: as above.
+        D44(unsafe {
+            let sign = _mm256_set1_pd(-0.0);
+            [_mm256_andnot_pd(sign, low), _mm256_andnot_pd(sign, high)]
+        })
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        let [low, high] = self.0;
+        // SAFETY: as above.
+        D44(unsafe {
+            let sign = _mm256_set1_pd(-0.0);
+            [_mm256_xor_pd(sign, low), _mm256_xor_pd(sign, high)]
+        })
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        let ([a, b], [c, d]) = (self.0, other.0);
+        // SAFETY: as above.
+        unsafe {
+            let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a, c));
+            (low | _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(b, d)) << 4) as u32
+        }
+    }
+}
