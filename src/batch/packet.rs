@@ -2,12 +2,12 @@
 
 use super::{Batch, Record};
 use crate::block::bundle::{Bundle, ChildRef};
-use crate::block::leaf::{KIND_TRIANGLES, LeafRef, block_ref};
+use crate::block::leaf::{KIND_TRIANGLES, LeafRef, TriangleBlock, block_ref};
 use crate::bvh::{Columns, ENOUGH_ROOM, Walk};
 use crate::math::Bits;
 use crate::math::rounding::{f32_above, f32_below};
 use crate::prim::Leaves;
-use crate::query::Query;
+use crate::query::{Exact, Query};
 use crate::ray::{Alike, GROUPS, RayPacket, Sixteen, WideBoxes};
 use crate::sieve::{Aim, Found, Opened, Sheared};
 use crate::simd::{Lanes, Scalar, Simd, Width};
@@ -142,10 +142,11 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             let active = if Q::Query::ORDERED { active } else { active & !self.met[group] };
             let mut found = aim.look(s, opened, lane as usize, active);
             found.clear &= self.trusted;
+            found.sure &= self.trusted;
             let (taken, doubt) = if Q::Query::ORDERED {
                 self.order(s, group, &found, aim.span(s, &found))
             } else {
-                (found.clear, found.candidates & !found.clear)
+                self.within_limits(s, group, &found, opened.block, lane)
             };
             self.met[group] |= taken;
             s.set_words(taken, block, &mut self.firsts[group].blocks);
@@ -161,6 +162,33 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
         if !Q::Query::ORDERED {
             self.packet.group(group).end(s, self.met[group]);
         }
+    }
+
+    /// The rays that meet a triangle within their limits, and those of which this is in doubt.
+    ///
+    /// Rays that start beside a large triangle are in doubt for `f32`, all of them together.
+    #[inline(always)]
+    fn within_limits<S: Simd>(
+        &mut self,
+        s: S,
+        group: usize,
+        found: &Found<<S as Width<16>>::V>,
+        block: &TriangleBlock,
+        lane: u32,
+    ) -> (u32, u32) {
+        let (mut met, mut doubt) = (found.clear, found.candidates & !found.clear);
+        let rays = self.packet.group(group);
+        for half in [0, 8] {
+            let lanes = found.sure & doubt & 0xFF << half;
+            if lanes != 0 {
+                let corners = block.triangle(lane as usize);
+                let [inside, outside] =
+                    Exact::within_limits(s, rays.lines(half), rays.limits(half), &corners);
+                met |= lanes & inside << half;
+                doubt &= !(lanes & (inside | outside) << half);
+            }
+        }
+        (met, doubt)
     }
 
     /// The rays that meet a triangle surely before what they met so far, which that replaces, and those of which this is

@@ -175,19 +175,32 @@ pub(crate) struct SureMeetings {
 }
 
 impl Exact {
+    /// Of eight rays whose lines surely pass between the edges of a triangle, those that surely meet it within their limits,
+    /// and those that surely do not, one bit each.
+    #[inline(always)]
+    pub fn within_limits<S: Simd>(
+        s: S,
+        line: [&[f32; 8]; 6],
+        [t_min, t_max]: [&[f32; 8]; 2],
+        corners: &[[f32; 3]; 3],
+    ) -> [u32; 2] {
+        let mut columns = [[0.0; 8]; 9];
+        for (column, x) in columns.iter_mut().zip(corners.as_flattened()) {
+            *column = [*x; 8];
+        }
+        let PlaneMeeting { t, t_error, clear, .. } = planes(s, line, &columns);
+        let margin = t_error.times(MARGIN);
+        let (near, far) = (t.sub(margin), t.add(margin));
+        let (t_min, t_max) = (s.widened(t_min), s.widened(t_max));
+        let inside = !(near.less(t_min) | t_max.less(far));
+        [clear & inside, clear & (far.less(t_min) | t_max.less(near))]
+    }
+
     /// What is answered of triangles that rays surely meet within their limits, eight of each: origin and direction of the
     /// rays, and the coordinates of the triangles' corners, side by side.
     #[inline(always)]
     pub fn of_sure<S: Simd>(s: S, line: [&[f32; 8]; 6], corners: &[[f32; 8]; 9]) -> SureMeetings {
-        let [ox, oy, oz, dx, dy, dz] = line;
-        let origin = [s.widened(ox), s.widened(oy), s.widened(oz)];
-        let direction = [s.widened(dx), s.widened(dy), s.widened(dz)];
-        let [ax, ay, az, bx, by, bz, cx, cy, cz] = corners;
-        let a = [s.widened(ax), s.widened(ay), s.widened(az)];
-        let b = [s.widened(bx), s.widened(by), s.widened(bz)];
-        let c = [s.widened(cx), s.widened(cy), s.widened(cz)];
-        let PlaneMeeting { t, t_error, weights, clear, .. } =
-            PlaneMeeting::new(origin, direction, [a, b, c]);
+        let PlaneMeeting { t, t_error, weights, clear, .. } = planes(s, line, corners);
         let margin = t_error.times(MARGIN);
         let nearest = s.load(&s.narrowed(t));
         let (near, far) = (s.load(&s.narrowed(t.sub(margin))), s.load(&s.narrowed(t.add(margin))));
@@ -336,6 +349,21 @@ fn unclear(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
         true => triangle::plane(&ray.line(), lane.corners()),
         false => triangle::meet(&ray.line(), lane.corners()),
     }
+}
+
+/// Where eight lines meet the planes of as many triangles.
+#[inline(always)]
+fn planes<S: Simd>(
+    s: S,
+    [ox, oy, oz, dx, dy, dz]: [&[f32; 8]; 6],
+    [ax, ay, az, bx, by, bz, cx, cy, cz]: &[[f32; 8]; 9],
+) -> PlaneMeeting<S::Doubles> {
+    let origin = [s.widened(ox), s.widened(oy), s.widened(oz)];
+    let direction = [s.widened(dx), s.widened(dy), s.widened(dz)];
+    let a = [s.widened(ax), s.widened(ay), s.widened(az)];
+    let b = [s.widened(bx), s.widened(by), s.widened(bz)];
+    let c = [s.widened(cx), s.widened(cy), s.widened(cz)];
+    PlaneMeeting::new(origin, direction, [a, b, c])
 }
 
 /// A part of the error more, for the arithmetic of the error.

@@ -150,12 +150,20 @@ impl Abreast {
     /// Origins and directions as they were given, eight from lane `first` on.
     #[inline(always)]
     pub fn lines(&self, first: usize) -> [&[f32; 8]; 6] {
-        const NOTHING: &[f32; 8] = &[0.0; 8];
-        let half = |k: usize| {
-            let (halves, _) = self.given[k].as_chunks::<8>();
-            halves.get(first / 8).unwrap_or(NOTHING)
-        };
+        let half = |column| self.half(column, first);
         [half(0), half(1), half(2), half(4), half(5), half(6)]
+    }
+
+    /// Their limits as they were given, eight from lane `first` on.
+    #[inline(always)]
+    pub fn limits(&self, first: usize) -> [&[f32; 8]; 2] {
+        [self.half(3, first), self.half(7, first)]
+    }
+
+    #[inline(always)]
+    fn half(&self, column: usize, first: usize) -> &[f32; 8] {
+        let (halves, _) = self.given[column].as_chunks::<8>();
+        halves.get(first / 8).unwrap_or(&[0.0; 8])
     }
 
     /// Nothing is of interest to these rays any more.

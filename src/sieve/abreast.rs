@@ -71,7 +71,9 @@ pub(crate) struct Aim<'r, V> {
 pub(crate) struct Found<V> {
     /// The filter could not reject it.
     pub candidates: u32,
-    /// It surely is met within the limits.
+    /// The lines of those surely pass between its edges.
+    pub sure: u32,
+    /// And it surely is met within the limits.
     pub clear: u32,
     meetings: Meetings<V>,
 }
@@ -155,9 +157,10 @@ impl<'r, V: Lanes<16>> Aim<'r, V> {
         let depths = [s.splat(depths[a % 16]), s.splat(depths[b % 16]), s.splat(depths[c % 16])];
         let meetings = Meetings::new::<S, true, 16>(s, self.middle.half, &areas, depths);
         let outside = areas.outside(s) | meetings.outside::<S, true, 16>(s, self.window);
-        let clear = areas.sure(s) & meetings.inside::<S, true, 16>(s, self.inner);
+        let sure = areas.sure(s);
+        let clear = sure & meetings.inside::<S, true, 16>(s, self.inner);
         let candidates = lanes & !outside;
-        Found { candidates, clear: candidates & clear, meetings }
+        Found { candidates, sure: candidates & sure, clear: candidates & clear, meetings }
     }
 
     /// Depths from the origins between which the rays really meet what [surely](Found::clear) is met.
