@@ -128,10 +128,11 @@ impl Case {
                 load(&folder.join(file)).map_err(|error| error.to_string())?
             }
         };
-        scene.model.sphere_sets.clear();
+        let mut model = scene.model.flattened().ok_or("has ellipsoids")?;
+        model.sphere_sets.clear();
         let camera = scene.cameras.swap_remove(0);
         let light = scene.lights.first().map_or(camera.position, |light| light.position);
-        Ok(Loaded { model: scene.model, view: self.view, camera, light })
+        Ok(Loaded { model, view: self.view, camera, light })
     }
 }
 
