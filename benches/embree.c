@@ -86,6 +86,32 @@ void bench_embree_move(BenchEmbree *e, const float *vertices, size_t vertex_coun
     rtcCommitGeometry(mesh);
 }
 
+int bench_embree_instance(BenchEmbree *e, const float *maps, size_t count)
+{
+    RTCScene top = rtcNewScene(e->device);
+    rtcSetSceneBuildQuality(top, e->quality);
+    rtcSetSceneFlags(top, rtcGetSceneFlags(e->scene));
+    for (size_t i = 0; i < count; i++) {
+        RTCGeometry instance = rtcNewGeometry(e->device, RTC_GEOMETRY_TYPE_INSTANCE);
+        rtcSetGeometryInstancedScene(instance, e->scene);
+        rtcAttachGeometryByID(top, instance, (unsigned)i);
+        rtcReleaseGeometry(instance);
+    }
+    rtcReleaseScene(e->scene);
+    e->scene = top;
+    bench_embree_place(e, maps, count);
+    return rtcGetDeviceError(e->device) != RTC_ERROR_NONE;
+}
+
+void bench_embree_place(BenchEmbree *e, const float *maps, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        RTCGeometry instance = rtcGetGeometry(e->scene, (unsigned)i);
+        rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, maps + 12 * i);
+        rtcCommitGeometry(instance);
+    }
+}
+
 int bench_embree_commit(BenchEmbree *e)
 {
     rtcCommitScene(e->scene);
@@ -133,9 +159,9 @@ static void fill(struct RTCRayHit *to, const BenchRay *from)
     to->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 }
 
-static BenchHit hit(float t, float u, float v, unsigned prim, unsigned geometry)
+static BenchHit hit(float t, float u, float v, unsigned prim, unsigned geometry, unsigned instance)
 {
-    BenchHit miss = {INFINITY, 0, 0, ~0u, ~0u, ~0u}, met = {t, u, v, prim, geometry, ~0u};
+    BenchHit miss = {INFINITY, 0, 0, ~0u, ~0u, ~0u}, met = {t, u, v, prim, geometry, instance};
     return geometry == RTC_INVALID_GEOMETRY_ID ? miss : met;
 }
 
@@ -148,7 +174,7 @@ void bench_embree_closest(BenchEmbree *e, const BenchRay *rays, BenchHit *hits, 
         struct RTCRayHit q;
         fill(&q, &rays[i]);
         rtcIntersect1(e->scene, &context, &q);
-        hits[i] = hit(q.ray.tfar, q.hit.u, q.hit.v, q.hit.primID, q.hit.geomID);
+        hits[i] = hit(q.ray.tfar, q.hit.u, q.hit.v, q.hit.primID, q.hit.geomID, q.hit.instID[0]);
     }
     _mm_setcsr(before);
 }
@@ -202,7 +228,7 @@ struct BenchBatch {
     {                                                                                              \
         const struct RTCRayHit##N *q = (const struct RTCRayHit##N *)packet;                        \
         return hit(q->ray.tfar[lane], q->hit.u[lane], q->hit.v[lane], q->hit.primID[lane],         \
-                   q->hit.geomID[lane]);                                                           \
+                   q->hit.geomID[lane], q->hit.instID[0][lane]);                                   \
     }                                                                                              \
     static void run_##N(RTCScene scene, struct RTCIntersectContext *context, const BenchBatch *b)  \
     {                                                                                              \
@@ -280,7 +306,7 @@ void bench_batch_hits(const BenchBatch *b, BenchHit *hits)
         hits[i] = b->width == 8    ? hit_8(at, lane)
                   : b->width == 16 ? hit_16(at, lane)
                                    : hit(q->ray.tfar, q->hit.u, q->hit.v, q->hit.primID,
-                                         q->hit.geomID);
+                                         q->hit.geomID, q->hit.instID[0]);
     }
 }
 

@@ -28,6 +28,10 @@ void bench_embree_moving(BenchEmbree *, int refit);
 void bench_embree_move(BenchEmbree *, const float *vertices, size_t vertex_count);
 /* The build. Zero on success. */
 int bench_embree_commit(BenchEmbree *);
+/* After the build: the scene becomes one of so many instances of itself, each with a map of three rows of four. */
+int bench_embree_instance(BenchEmbree *, const float *maps, size_t count);
+/* Other maps for these. */
+void bench_embree_place(BenchEmbree *, const float *maps, size_t count);
 /* Bytes that the device has allocated, the copied meshes included. */
 size_t bench_embree_bytes(const BenchEmbree *);
 void bench_embree_free(BenchEmbree *);

@@ -1,12 +1,12 @@
 //! The closest point of a scene, by the structure at hand.
 
+use crate::block::level::Level;
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::levels::Shown;
 use crate::math::float::sqrt;
-use crate::math::wide;
-use crate::point::{Image, Nearest, square_between};
+use crate::point::{Image, NearInstances, Nearest, Seek};
 use crate::prim::Leaves;
 use crate::query::{Filter, QueryOptions, clamped_weights, geometry_of};
 use crate::ray::NONE;
@@ -42,24 +42,55 @@ pub(crate) fn closest_point(
         return None;
     }
     let radius = f64::from(if radius > f32::MAX { f32::MAX } else { radius });
-    let ask_in = |shown: &Shown, image, limit| closest_in(shown, image, point, limit, options);
-    let mut best = ask_in(&Shown::own(block), Image::SAME, radius * radius);
-    let level = block.level();
-    for number in 0..level.as_ref().map_or(0, |level| level.instances.len() as u32) {
-        let limit = best.as_ref().map_or(radius * radius, |(square, _)| *square);
-        let found = level.as_ref().and_then(|level| {
-            let (shown, record) = Shown::of(level, number, options)?;
-            let near = square_between(wide(point), &record.bounds) <= limit;
-            near.then(|| ask_in(&shown, Image::new(record.map()), limit)).flatten()
-        });
-        // Of equally close ones the first stays.
-        if let Some((square, _)) = found
-            && best.as_ref().is_none_or(|(least, _)| square < *least)
-        {
-            best = found;
-        }
+    let own = Shown::own(block);
+    let mut best = closest_in(&own, Image::SAME, point, radius * radius, options);
+    if let Some(level) = block.level() {
+        closest_instance(&level, point, radius * radius, options, &mut best);
     }
     best.map(|(_, hit)| hit)
+}
+
+/// A closest point and the square of its distance.
+type Found = (f64, PointHit);
+
+/// Looks for something closer than `best` in instances.
+fn closest_instance(
+    level: &Level,
+    point: [f32; 3],
+    farthest: f64,
+    options: &QueryOptions,
+    best: &mut Option<Found>,
+) {
+    let limit = |best: &Option<Found>| best.as_ref().map_or(farthest, |(square, _)| *square);
+    let start = limit(best);
+    let mut visit = |number| {
+        let found = Shown::of(level, number, options).and_then(|(shown, record)| {
+            closest_in(&shown, Image::new(record.map()), point, limit(best), options)
+        });
+        if let Some(found) = found
+            && best.as_ref().is_none_or(|best| is_before(&found, best))
+        {
+            *best = Some(found);
+        }
+        limit(best)
+    };
+    let mut near = NearInstances::new(level, point, start, &mut visit);
+    let index = &level.index.parts();
+    // Maps that are beyond all bounds make boxes that no cell or wall is right for.
+    if index.header.reach < VAST {
+        search(index, &mut near);
+    } else {
+        (0..level.instances.len() as u32).for_each(|number| near.consider(number));
+    }
+}
+
+/// No instances that are farther away have an index that can be searched.
+const VAST: f32 = (1u128 << 126) as f32;
+
+/// The closer comes first, of equally close ones that of the first instance; [`NONE`] is before all numbers.
+fn is_before((square, hit): &Found, (least, best): &Found) -> bool {
+    let first = hit.instance.wrapping_add(1) < best.instance.wrapping_add(1);
+    square < least || (square == least && first)
 }
 
 /// The closest point in one instance, or in none, no farther than the root of `limit`; and the square of its distance.
@@ -69,7 +100,7 @@ fn closest_in(
     point: [f32; 3],
     limit: f64,
     options: &QueryOptions,
-) -> Option<(f64, PointHit)> {
+) -> Option<Found> {
     let (choice, block) = (shown.choice(options), &shown.block.parts());
     let filter = Filter::new(choice, block.geometries, block.prim_ids);
     let leaves = Leaves::of(block);
@@ -92,7 +123,7 @@ fn closest_in(
     Some((foot.square, hit))
 }
 
-fn search(block: &Block, nearest: &mut Nearest) {
+fn search(block: &Block, nearest: &mut impl Seek) {
     match block.bundles {
         Bundles::Sixteen(bundles) => bvh::search_wide(bundles, nearest),
         Bundles::Eight(bundles) => bvh::search_wide(bundles, nearest),

@@ -12,11 +12,11 @@ use crate::block::{Bundles, Finished, KIND_BVH};
 use crate::math::rounding::f32_above;
 use crate::math::wide;
 use crate::query::{
-    Choice, Decide, Exact, Query, QueryOptions, SphereLane, TriangleLane, Watch, Watertight,
-    shares_bit,
+    Choice, Counts, Decide, Exact, Query, QueryOptions, SphereLane, TriangleLane, Watch,
+    Watertight, shares_bit,
 };
 use crate::ray::{Hit, Late, NONE, PreparedRay, Ray, WideSlab};
-use crate::simd::{self, Kernel, Simd};
+use crate::simd::{self, Kernel, Scalar, Simd};
 use crate::trace::{AnyHit, ClosestHit, ClosestMet, ask, trace};
 
 /// The closest hit of a block with instances among what `options` leave.
@@ -42,8 +42,9 @@ pub(crate) fn closest<D: Across, W: Watch>(
         t_max: best.as_ref().map_or(ray.t_max, |best| best.limit(ray)),
         ..*ray
     };
-    let start = limited(&best);
-    visit_reached(&level, &start, &mut |number| {
+    let (start, mut steps) = (limited(&best), Counts::default());
+    let counts = W::COUNTS.then_some(&mut steps);
+    visit_reached(&level, &start, counts, &mut |number| {
         let found = Shown::of(&level, number, options).and_then(|(shown, record)| {
             let ray = record.object_ray(&limited(&best))?;
             ask_in(&shown, &ray).map(|hit| Best { hit, shown, ray })
@@ -55,6 +56,7 @@ pub(crate) fn closest<D: Across, W: Watch>(
         }
         Some(limited(&best).t_max)
     });
+    watch.steps(steps.steps);
     best.map(|best| best.hit)
 }
 
@@ -74,13 +76,15 @@ pub(crate) fn any<D: Decide, W: Watch>(
     if is_hit_in(&Shown::own(block), ray) {
         return true;
     }
-    let mut hit = false;
-    visit_reached(&level, ray, &mut |number| {
+    let (mut hit, mut steps) = (false, Counts::default());
+    let counts = W::COUNTS.then_some(&mut steps);
+    visit_reached(&level, ray, counts, &mut |number| {
         hit = Shown::of(&level, number, options).is_some_and(|(shown, record)| {
             record.object_ray(ray).is_some_and(|ray| is_hit_in(&shown, &ray))
         });
         (!hit).then_some(ray.t_max)
     });
+    watch.steps(steps.steps);
     hit
 }
 
@@ -179,18 +183,30 @@ impl Across for Watertight {
 pub(crate) type Visit<'v> = dyn FnMut(u32) -> Option<f32> + 'v;
 
 /// Calls `visit` for each instance whose rounded ray may hit something, near ones first as far as the index is a tree, and
-/// hardly ever twice.
-pub(crate) fn visit_reached(level: &Level, ray: &Ray, visit: &mut Visit) {
+/// hardly ever twice. Boxes and cells of the index are counted if there are `counts`.
+pub(crate) fn visit_reached(
+    level: &Level,
+    ray: &Ray,
+    mut counts: Option<&mut Counts>,
+    visit: &mut Visit,
+) {
     let index = level.index.header();
     let farthest = ray.origin.iter().fold(0.0f32, |farthest, x| farthest.max(x.abs()));
     let beyond = f64::from(farthest) - f64::from(level.head.calm);
     let widening = f64::from(level.head.spread) * beyond.max(0.0);
     // What is not a tree has its boxes in its cells, as wide as they are.
     if widening == 0.0 || index.kind == KIND_BVH {
-        let reached = simd::dispatch(Reaching { level, ray, widening: f32_above(widening), visit });
+        let widening = f32_above(widening);
+        let reached = match counts.as_deref_mut() {
+            None => simd::dispatch(Reaching { level, ray, widening, visit, watch: () }),
+            Some(watch) => Reaching { level, ray, widening, visit, watch }.run(Scalar),
+        };
         if reached.is_some() {
             return;
         }
+    }
+    if let Some(counts) = counts {
+        counts.steps += level.instances.len() as u64;
     }
     visit_all(level, ray, widening, visit);
 }
@@ -253,19 +269,20 @@ const SHORTEST: f32 = 1.0 / (1u64 << 60) as f32;
 
 /// A ray on its way through the index, waiting for a backend. The answer is `None` if the ray is none for which boxes in
 /// `f32` are right.
-struct Reaching<'a, 'm, 'v> {
+struct Reaching<'a, 'm, 'v, W> {
     level: &'a Level<'m>,
     ray: &'a Ray,
     widening: f32,
     visit: &'a mut Visit<'v>,
+    watch: W,
 }
 
-impl Kernel for Reaching<'_, '_, '_> {
+impl<W: Watch> Kernel for Reaching<'_, '_, '_, W> {
     type Output = Option<()>;
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Option<()> {
-        let Reaching { level, ray, widening, visit } = self;
+        let Reaching { level, ray, widening, visit, watch } = self;
         let block = &level.index.parts();
         let (mut late, slab) = ray.set_out(s, block.header.reach)?;
         let slab = if widening > 0.0 { slab.widened(widening) } else { slab };
@@ -274,7 +291,7 @@ impl Kernel for Reaching<'_, '_, '_> {
         let near = (!alone).then(|| Near::new(late.prepare(), f64::from(widening)));
         let (t_bound, t_scale) = (late.t_max, late.t_scale());
         let mut query =
-            Reach { level, visit, t_bound, t_scale, near, visited: [NONE; MAILBOX], watch: () };
+            Reach { level, visit, t_bound, t_scale, near, visited: [NONE; MAILBOX], watch };
         trace(s, block, &mut late, &slab, &mut query);
         Some(())
     }
@@ -284,18 +301,18 @@ impl Kernel for Reaching<'_, '_, '_> {
 const MAILBOX: usize = 32;
 
 /// The query that calls back for instances.
-struct Reach<'a, 'm, 'v> {
+struct Reach<'a, 'm, 'v, W> {
     level: &'a Level<'m>,
     visit: &'a mut Visit<'v>,
     t_bound: f32,
     t_scale: f64,
     near: Option<Near>,
     visited: [u32; MAILBOX],
-    watch: (),
+    watch: W,
 }
 
-impl Query for Reach<'_, '_, '_> {
-    type Watch = ();
+impl<W: Watch> Query for Reach<'_, '_, '_, W> {
+    type Watch = W;
     // The same instances for every backend, for the sake of the watertight mode.
     const ANY_BOXES: bool = false;
     const ORDERED: bool = true;
@@ -317,10 +334,14 @@ impl Query for Reach<'_, '_, '_> {
     #[inline(never)]
     fn instance(&mut self, number: u32) -> bool {
         let slot = number as usize % MAILBOX;
-        if let Some(near) = &self.near
-            && (self.visited[slot] == number || !near.reaches(self.level, number))
-        {
-            return false;
+        if let Some(near) = &self.near {
+            if self.visited[slot] == number {
+                return false;
+            }
+            self.watch.step();
+            if !near.reaches(self.level, number) {
+                return false;
+            }
         }
         self.visited[slot] = number;
         let Some(limit) = (self.visit)(number) else { return true };
@@ -333,7 +354,7 @@ impl Query for Reach<'_, '_, '_> {
     }
 
     #[inline(always)]
-    fn watch(&mut self) -> &mut () {
+    fn watch(&mut self) -> &mut W {
         &mut self.watch
     }
 }

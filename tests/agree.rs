@@ -53,7 +53,7 @@ fn scenes_from_files() {
         "classic/teapot.obj",
         "classic/sponza_part.obj",
     ] {
-        let model = load(&folder.join(file)).unwrap_or_else(|error| panic!("{error}")).model;
+        let model = load(&folder.join(file)).unwrap_or_else(|error| panic!("{error}")).model.own;
         let all = All::of(&model);
         let [list, rest @ ..] = all.accels();
         let mut hits = 0;

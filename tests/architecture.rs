@@ -25,7 +25,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         "prim",
         &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
     ),
-    ("point", &["block", "instance", "math", "prim", "query"]),
+    ("point", &["block", "instance", "math", "prim", "query", "ray"]),
     ("choice", &["block", "math", "prim", "scene"]),
     ("list", &["block", "error", "prim", "scene"]),
     (

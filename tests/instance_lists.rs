@@ -144,8 +144,13 @@ fn closest_points_are_those_of_the_flattened_scene() {
     }
     let mut random = Random::new(22);
     let mut instanced = 0;
-    for _ in 0..8 {
-        let maps: Vec<_> = (0..5).map(|_| whole_map(&mut random)).collect();
+    for round in 0..10 {
+        // Some rounds with so many that an index is deep, all twice: of the same place the first instance is closest.
+        let count = if round < 8 { 5 } else { 60 };
+        let mut maps: Vec<_> = (0..count).map(|_| whole_map(&mut random)).collect();
+        if round >= 8 {
+            maps.extend_from_within(..);
+        }
         let mut flat = own.clone();
         for map in &maps {
             let TriangleMesh { vertices, indices } = child.meshes[0].clone();

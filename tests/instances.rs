@@ -6,8 +6,8 @@ mod common;
 
 use common::{All, agreed, bits};
 use raykern::{
-    Accel, BuildOptions, Facing, Hit, Instance, Mesh, NONE, OwnedAccel, PlainList, Precision,
-    PrimId, QueryOptions, Ray, Scene,
+    Accel, BuildOptions, Counts, Facing, Hit, Instance, Mesh, NONE, OwnedAccel, PlainList,
+    Precision, PrimId, QueryOptions, Ray, Scene,
 };
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::{Model, TriangleMesh};
@@ -522,6 +522,37 @@ fn other_ways_to_ask_agree() {
             let found = accel.intersect_with(ray, &tight);
             assert_eq!(found.is_some(), accel.occluded_with(ray, &tight), "{name} {ray:?}");
             assert!(found.is_some() || single.is_none(), "{name} {ray:?}");
+        }
+    }
+}
+
+/// The boxes of the index count as those of a child do, but instances are no primitives.
+#[test]
+fn the_index_is_counted() {
+    let model: Model = make::sphere(200).into();
+    let child =
+        model.with_scene(|scene| OwnedAccel::bvh(scene, &BuildOptions::default()).expect("a BVH"));
+    let place = |x: f32| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let instances: Vec<_> =
+        (0..50).map(|i| Instance::new(&child.accel(), place(4.0 * i as f32))).collect();
+    let all = All::build(&Scene::new(&[], &[]).with_instances(&instances));
+    let through = Ray::new([8.1, 0.2, -3.0], [0.0, 0.0, 1.0]);
+    let beside = Ray { origin: [10.0, 0.2, -3.0], ..through };
+    for (name, accel) in all.accels() {
+        let count = |ray: &Ray| {
+            let mut counts = [Counts::default(); 2];
+            let hit = accel.intersect_counted(ray, &DEFAULT, &mut counts[0]);
+            assert_eq!(accel.occluded_counted(ray, &DEFAULT, &mut counts[1]), hit.is_some());
+            counts
+        };
+        let mut alone = Counts::default();
+        let ray = accel.object_ray(2, &through).expect("a ray");
+        child.accel().intersect_counted(&ray, &DEFAULT, &mut alone);
+        let [closest, any] = count(&through);
+        assert_eq!((closest.blocks, closest.tests), (alone.blocks, alone.tests), "{name}");
+        assert!(closest.steps > alone.steps && any.steps > 0, "{name}: {closest:?} {alone:?}");
+        for counts in count(&beside) {
+            assert!(counts.steps > 0 && counts.blocks == 0, "{name}: {counts:?}");
         }
     }
 }

@@ -29,6 +29,8 @@ unsafe extern "C" {
     ) -> c_int;
     fn bench_embree_moving(scene: *mut RawScene, refit: c_int);
     fn bench_embree_move(scene: *mut RawScene, vertices: *const f32, vertex_count: usize);
+    fn bench_embree_instance(scene: *mut RawScene, maps: *const f32, count: usize) -> c_int;
+    fn bench_embree_place(scene: *mut RawScene, maps: *const f32, count: usize);
     fn bench_embree_commit(scene: *mut RawScene) -> c_int;
     fn bench_embree_bytes(scene: *const RawScene) -> usize;
     fn bench_embree_free(scene: *mut RawScene);
@@ -99,6 +101,26 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) {
                 add_batches(lineup, &name, classes, &scene);
             }
             lineup.add(name, setup.single, Single(scene));
+        }
+    }
+}
+
+/// Adds the setups of medium quality over instances of `model`. Of the builds only that over the instances counts.
+///
+/// One ray at a time: packets and streams are left out, since `rtcOccluded16` of Embree 3.13.5 does not come back from instances.
+pub fn join_instances(lineup: &mut Lineup, model: &Model, maps: &[[f32; 12]], options: &Options) {
+    for setup in SETUPS.iter().filter(|setup| setup.batch.is_some()) {
+        for (suffix, config) in DEVICES {
+            let name = format!("{}{suffix}", setup.name);
+            if !options.wants_peer(&name) {
+                continue;
+            }
+            let Some((scene, seconds, bytes)) = Scene::instanced(model, maps, config, setup) else {
+                lineup.notes.push(format!("{name}: Embree refused"));
+                continue;
+            };
+            lineup.built(&name, seconds, Some(bytes));
+            lineup.add(name, setup.single, Single(Rc::new(scene)));
         }
     }
 }
@@ -180,6 +202,29 @@ impl Scene {
         }
         let scene = scene.with_meshes(model)?;
         (!scene.commit()).then_some(scene)
+    }
+
+    /// Over instances of a model; with the seconds and the bytes that what is over the model takes, built anew as for a frame.
+    fn instanced(
+        model: &Model,
+        maps: &[[f32; 12]],
+        config: &CStr,
+        setup: &Setup,
+    ) -> Option<(Self, f64, usize)> {
+        let scene = Scene::new(model, config, setup).filter(|scene| !scene.commit())?;
+        let below = scene.bytes();
+        let (numbers, count) = (maps.as_flattened().as_ptr(), maps.len());
+        // SAFETY: the scene is built, and there are that many maps.
+        if unsafe { bench_embree_instance(scene.0, numbers, count) != 0 } || scene.commit() {
+            return None;
+        }
+        let (_, seconds) = timed_build(|| {
+            // SAFETY: the scene has that many instances.
+            unsafe { bench_embree_place(scene.0, numbers, count) };
+            scene.commit()
+        });
+        let bytes = scene.bytes() - below;
+        Some((scene, seconds, bytes))
     }
 
     fn with_meshes(self, model: &Model) -> Option<Self> {

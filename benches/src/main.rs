@@ -7,6 +7,7 @@ mod c_face;
 mod check;
 #[cfg(feature = "embree")]
 mod embree;
+mod instances;
 mod lineup;
 mod measure;
 mod motion;
@@ -38,6 +39,11 @@ fn main() -> Result<()> {
     let mut watch = Watch::new();
     if !watch.counts_events() {
         println!("no processor events: this machine does not count them\n");
+    }
+    if options.instances {
+        let results = instances::run(&options, &mut watch)?;
+        ratios::print(&results);
+        return Ok(());
     }
     let mut results = Vec::new();
     for case in scenes::cases(&options) {

@@ -17,8 +17,10 @@ pub struct SceneResult {
     pub name: String,
     /// Whether a plain call was measured, not a scene.
     pub fixed_cost: bool,
-    /// How many triangles it has.
-    pub triangles: usize,
+    /// How many there are of what structures are built over.
+    pub count: usize,
+    /// What that is, in the singular: triangles, or instances.
+    pub unit: &'static str,
     /// What builds cost.
     pub structures: Vec<Structure>,
     /// Name and class of each method.
@@ -88,34 +90,47 @@ pub fn measure(
         let rays = maker.make(kind);
         let right = Answers::of(&accel, &rays, kind.question());
         hold_against_list(&list.accel(), &rays, &right)?;
-        let methods = take_turns(&lineup.subjects, kind, &rays, &right, options, watch);
-        for (subject, method) in lineup.subjects.iter().zip(&methods) {
-            let allowed = allowed_to_differ(subject.class, rays.len(), options.quick);
-            ensure!(
-                method.differing <= allowed,
-                "{} answers {} of {} {} rays unlike our exact BVH",
-                subject.name,
-                method.differing,
-                rays.len(),
-                kind.name()
-            );
-        }
-        kinds.push(KindResult {
-            kind,
-            rays: rays.len(),
-            hit_share: right.hit_share(),
-            visits: visits(&accel, &rays, kind.question()),
-            methods,
-        });
+        kinds.push(measure_kind(&lineup.subjects, &accel, kind, (&rays, &right), options, watch)?);
     }
     Ok(SceneResult {
         name: case.name.clone(),
         fixed_cost: case.fixed_cost,
-        triangles: scene.model.triangle_count(),
+        count: scene.model.triangle_count(),
+        unit: "triangle",
         structures: lineup.structures,
         subjects: lineup.subjects.into_iter().map(|s| (s.name, s.class)).collect(),
         kinds,
         notes: lineup.notes,
+    })
+}
+
+/// Traces and checks the rays of one kind; `accel` says what is right, which is known already, and what is visited.
+pub fn measure_kind(
+    subjects: &[Subject],
+    accel: &Accel,
+    kind: Kind,
+    (rays, right): (&[Ray], &Answers),
+    options: &Options,
+    watch: &mut Watch,
+) -> Result<KindResult> {
+    let methods = take_turns(subjects, kind, rays, right, options, watch);
+    for (subject, method) in subjects.iter().zip(&methods) {
+        let allowed = allowed_to_differ(subject.class, rays.len(), options.quick);
+        ensure!(
+            method.differing <= allowed,
+            "{} answers {} of {} {} rays unlike our exact BVH",
+            subject.name,
+            method.differing,
+            rays.len(),
+            kind.name()
+        );
+    }
+    Ok(KindResult {
+        kind,
+        rays: rays.len(),
+        hit_share: right.hit_share(),
+        visits: visits(accel, rays, kind.question()),
+        methods,
     })
 }
 

@@ -44,6 +44,9 @@ pub struct Options {
     /// Instead of still scenes: some that move, what a frame costs by refitting or building anew, and rays after it.
     #[arg(long)]
     pub motion: bool,
+    /// Instead of still scenes: one model many times, by instances.
+    #[arg(long)]
+    pub instances: bool,
     /// The folder of scene files; else RAYKERN_SCENES, else shared/scenes beside the workspace.
     #[arg(long, value_name = "DIR")]
     pub folder: Option<PathBuf>,

@@ -72,6 +72,17 @@ fn add_bvh(lineup: &mut Lineup, name: &str, accel: &Rc<OwnedAccel<'static>>) {
     lineup.add(format!("{name} batch"), Class::Batch(exact), Batch(accel.clone()));
 }
 
+/// Adds structures over instances.
+pub fn add_instances(
+    lineup: &mut Lineup,
+    bvh: &Rc<OwnedAccel<'static>>,
+    grid: OwnedAccel<'static>,
+) {
+    add_bvh(lineup, "bvh", bvh);
+    let grid = Single::new(&Rc::new(grid), Precision::Exact);
+    lineup.add("grid over grid", Class::Grid(Precision::Exact), grid);
+}
+
 /// One call a ray.
 struct Single {
     accel: Rc<OwnedAccel<'static>>,

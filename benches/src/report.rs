@@ -31,16 +31,18 @@ fn processor() -> String {
 
 /// Everything about one scene.
 pub fn scene(result: &SceneResult) {
-    println!("{}: {} triangles", result.name, result.triangles);
+    let SceneResult { name, count, unit, .. } = result;
+    println!("{name}: {count} {unit}s");
     result.notes.iter().for_each(|note| println!("  {note}"));
-    println!("  {:<36}{:>10}{:>14}{:>16}", "build", "s", "ns/triangle", "bytes/triangle");
+    let [each, bytes] = ["ns", "bytes"].map(|what| format!("{what}/{unit}"));
+    println!("  {:<36}{:>10}{each:>14}{bytes:>16}", "build", "ms");
     for structure in &result.structures {
-        let each = |x: f64| x / result.triangles.max(1) as f64;
+        let each = |x: f64| x / result.count.max(1) as f64;
         let bytes = structure.bytes.map(|bytes| format!("{:.1}", each(bytes as f64)));
         println!(
-            "  {:<36}{:>10.3}{:>14.0}{:>16}",
+            "  {:<36}{:>10.2}{:>14.0}{:>16}",
             structure.name,
-            structure.seconds,
+            1e3 * structure.seconds,
             each(1e9 * structure.seconds),
             bytes.unwrap_or("-".to_string())
         );
@@ -108,12 +110,12 @@ pub fn growth(results: &[SceneResult]) {
     kinds.iter().for_each(|kind| print!("{:>11}", kind.kind.name()));
     println!();
     for result in results {
-        let each = |x: f64| x / result.triangles.max(1) as f64;
+        let each = |x: f64| x / result.count.max(1) as f64;
         for structure in &result.structures {
             let bytes = structure.bytes.map(|bytes| format!("{:.1}", each(bytes as f64)));
             print!(
                 "  {:>10}  {:<20}{:>12.0}{:>12}",
-                result.triangles,
+                result.count,
                 structure.name,
                 each(1e9 * structure.seconds),
                 bytes.unwrap_or("-".to_string())
@@ -138,7 +140,7 @@ pub fn csv(results: &[SceneResult], file: &Path) -> Result<()> {
     head.extend(EVENTS);
     out.write_record(&head)?;
     for result in results {
-        let triangles = result.triangles.to_string();
+        let triangles = result.count.to_string();
         for structure in &result.structures {
             let bytes = structure.bytes.map_or(String::new(), |bytes| bytes.to_string());
             let seconds = structure.seconds.to_string();

@@ -118,21 +118,33 @@ fn made(name: &str, make: fn(usize) -> Model, triangles: usize, view: View) -> C
 impl Case {
     /// Loads or makes it; the reason when that cannot be done.
     pub fn load(&self, options: &Options) -> Result<Loaded, String> {
-        let mut scene = match self.source {
+        let scene = match self.source {
             Source::Made { make, triangles, up, from } => {
                 RenderScene::portrait(make(triangles), up, from)
             }
-            Source::File(file) => {
-                let folder = shared_scenes::folder(options.folder.as_deref());
-                let folder = folder.ok_or("no folder of scenes (--folder, RAYKERN_SCENES)")?;
-                load(&folder.join(file)).map_err(|error| error.to_string())?
-            }
+            Source::File(file) => read_file(file, options)?,
         };
-        scene.model.sphere_sets.clear();
-        let camera = scene.cameras.swap_remove(0);
-        let light = scene.lights.first().map_or(camera.position, |light| light.position);
-        Ok(Loaded { model: scene.model, view: self.view, camera, light })
+        prepared(scene, self.view)
     }
+}
+
+/// The scene of a file in the folder of scenes, seen as the file says; the reason when it cannot be loaded.
+pub fn load_file(file: &str, options: &Options) -> Result<Loaded, String> {
+    prepared(read_file(file, options)?, View::Given)
+}
+
+fn read_file(file: &str, options: &Options) -> Result<RenderScene, String> {
+    let folder = shared_scenes::folder(options.folder.as_deref());
+    let folder = folder.ok_or("no folder of scenes (--folder, RAYKERN_SCENES)")?;
+    load(&folder.join(file)).map_err(|error| error.to_string())
+}
+
+fn prepared(mut scene: RenderScene, view: View) -> Result<Loaded, String> {
+    let mut model = scene.model.flattened().ok_or("has ellipsoids")?;
+    model.sphere_sets.clear();
+    let camera = scene.cameras.swap_remove(0);
+    let light = scene.lights.first().map_or(camera.position, |light| light.position);
+    Ok(Loaded { model, view, camera, light })
 }
 
 /// Four by four halls of pillars and crates on each of five storeys, with gaps between them.

@@ -20,7 +20,7 @@ pub struct Measured {
     pub name: String,
     /// Its file.
     pub origin: String,
-    /// Triangles, instances flattened.
+    /// Triangles that are stored: once, however often they are seen.
     pub triangles: usize,
     /// Spheres.
     pub spheres: usize,
@@ -145,7 +145,7 @@ fn build(
 ) -> Result<(OwnedAccel<'static>, Vec<f64>)> {
     let once = || {
         let start = Instant::now();
-        let accel = scene.model.with_scene(|s| structure.build(s));
+        let accel = scene.model.build(|s| structure.build(s));
         accel.map(|accel| (accel, start.elapsed().as_secs_f64()))
     };
     let (mut accel, first) =

@@ -1,5 +1,6 @@
 //! What surrounds the core: loaders, scene makers, a renderer, an exact oracle, statistics.
 
+pub mod assembly;
 pub mod chart;
 pub mod load;
 pub mod make;

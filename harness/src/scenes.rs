@@ -162,8 +162,10 @@ impl Parts {
         let [eye, target] = [view.eye, view.target].map(DVec3::from);
         let camera = Camera::look_at(eye, target, up, view.fov, 1.0, size);
         RenderScene {
-            model: Model { meshes, sphere_sets: spheres.into_iter().map(|s| vec![s]).collect() },
+            model: Model { meshes, sphere_sets: spheres.into_iter().map(|s| vec![s]).collect() }
+                .into(),
             geometry_material: (0..materials.len()).collect(),
+            place_material: Vec::new(),
             materials,
             lights: lights
                 .iter()
@@ -203,7 +205,8 @@ mod tests {
     fn every_scene_has_a_material_for_each_geometry() {
         for (name, make) in ALL {
             let scene = make();
-            let geometries = scene.model.meshes.len() + scene.model.sphere_sets.len();
+            let own = &scene.model.own;
+            let geometries = own.meshes.len() + own.sphere_sets.len();
             assert_eq!(scene.geometry_material.len(), geometries, "{name}");
             assert!(scene.geometry_material.iter().all(|&m| m < scene.materials.len()), "{name}");
             assert!(by_name(name).is_some());

@@ -216,7 +216,7 @@ fn scenes() -> Vec<(String, Model)> {
         Some(folder) => scenes.extend(SHARED.map(|file| {
             let scene = load(&folder.join(file)).unwrap_or_else(|error| panic!("{error}"));
             let name = Path::new(file).file_stem().unwrap_or_default();
-            (name.to_string_lossy().into_owned(), scene.model)
+            (name.to_string_lossy().into_owned(), scene.model.flattened().expect("no ellipsoids"))
         })),
     }
     scenes.iter_mut().for_each(|(_, model)| model.sphere_sets.clear());

@@ -66,7 +66,7 @@ fn winding(
 
 /// Surfaces looked at, and those around which numbers do not fit.
 fn count_wrong(accel: &Accel, scene: &RenderScene, way: Way, step: u32) -> [usize; 2] {
-    let model: &Model = &scene.model;
+    let model: &Model = &scene.model.own;
     let closed: Vec<_> = model.meshes.iter().map(is_closed).collect();
     let camera = &scene.cameras[0];
     let [width, height] = camera.resolution;
@@ -93,7 +93,7 @@ fn check(name: &str, scene: &RenderScene, step: u32) {
     type Build = fn(&raykern::Scene<'_, 'static>, &BuildOptions) -> Built;
     for build in [OwnedAccel::grid as Build, OwnedAccel::bvh as Build] {
         let owned =
-            scene.model.with_scene(|s| build(s, &BuildOptions::default()).expect("a build"));
+            scene.model.own.with_scene(|s| build(s, &BuildOptions::default()).expect("a build"));
         let [seen, wrong] = count_wrong(&owned.accel(), scene, Way::Origins, step);
         println!("{name}: {wrong} of {seen} surfaces");
         assert!(seen > 5_000 && wrong == 0, "{name}: {wrong} of {seen}");

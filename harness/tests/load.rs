@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use raykern_harness::assembly::Place;
 use raykern_harness::load::{LoadError, load, metu, obj, ply};
 use raykern_harness::render::{MaterialKind, RenderScene};
 
@@ -34,6 +35,7 @@ const MESH: &str = "<Mesh id=\"1\"><Material>2</Material><Transformations>t1</Tr
 const MOVES: &str = "<Transformations><Translation id=\"1\">10 0 0</Translation>
 <Translation id=\"2\">0 5 0</Translation><Scaling id=\"1\">2 2 2</Scaling>
 <Rotation id=\"1\">90 0 0 3</Rotation><Scaling id=\"2\">1 2 1</Scaling>
+<Scaling id=\"3\">1 0 1</Scaling>
 <Composite id=\"1\">1 0 0 7 0 1 0 8 0 0 1 9 0 0 0 1</Composite></Transformations>";
 
 /// The second vertex, `1 0 0` in the file, of each mesh.
@@ -41,6 +43,7 @@ fn second_vertices(objects: &str) -> Vec<[f32; 3]> {
     let scene = parse(&format!("{MOVES}<Objects>{objects}</Objects>")).unwrap();
     scene
         .model
+        .own
         .meshes
         .iter()
         .map(|mesh| mesh.vertices[1].map(|x| (x * 1e5).round() / 1e5))
@@ -56,8 +59,8 @@ fn materials_go_by_position_and_geometries_keep_them() {
     ))
     .unwrap();
     assert_eq!(scene.geometry_material, [1, 0, 0]);
-    assert_eq!(scene.model.sphere_sets, [vec![[1.0, 1.0, 5.0, 2.0]]]);
-    assert_eq!(scene.model.meshes[1].vertices, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 5.0]]);
+    assert_eq!(scene.model.own.sphere_sets, [vec![[1.0, 1.0, 5.0, 2.0]]]);
+    assert_eq!(scene.model.own.meshes[1].vertices, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 5.0]]);
     assert_eq!(scene.materials[1].kind, MaterialKind::Mirror { reflectance: DVec3::Y });
     assert_eq!(
         (scene.cameras[0].resolution, scene.cameras[0].image_name.as_str()),
@@ -94,8 +97,38 @@ fn instances_stand_on_their_base_unless_reset() {
     assert_eq!(second_vertices(&chain.concat()), expected);
 }
 
+/// Enough triangles to be worth an instance.
+const STRIP: &str = "1 2 3 2 3 4 1 2 4 1 3 4 1 2 3 2 3 4 1 2 4 1 3 4 1 2 3 2 3 4 1 2 4 1 3 4 1 2 3 2 3 4 1 2 4 1 3 4";
+
 #[test]
-fn spheres_turn_and_grow_but_do_not_become_ellipsoids() {
+fn a_mesh_that_is_shown_twice_is_stored_once() {
+    let instance = |id: u32, base: u32, words: &str, more: &str| {
+        format!(
+            "<MeshInstance id=\"{id}\" baseMeshId=\"{base}\" {more}><Material>1</Material>
+<Transformations>{words}</Transformations></MeshInstance>"
+        )
+    };
+    let objects = [
+        MESH.replace("id=\"1\"", "id=\"7\""),
+        MESH.replace("1 2 3", STRIP),
+        instance(2, 1, "t2", ""),
+        instance(3, 2, "s2 t2", "resetTransform=\"true\""),
+        // Flat: copied.
+        instance(4, 1, "s3", ""),
+    ];
+    let scene = parse(&format!("{MOVES}<Objects>{}</Objects>", objects.concat())).unwrap();
+    let model = &scene.model;
+    let counts = [model.own.triangle_count(), model.triangle_count(), model.shown_triangle_count()];
+    assert_eq!((counts, model.children.len()), ([17, 33, 65], 1));
+    let shifts =
+        |at: [usize; 3]| model.places.iter().map(move |p| at.map(|k| p.object_to_world[k]));
+    assert!(shifts([3, 7, 11]).eq([[10.0, 0.0, 0.0], [10.0, 5.0, 0.0], [0.0, 5.0, 0.0]]));
+    assert!(shifts([0, 5, 10]).eq([[1.0; 3], [1.0; 3], [1.0, 2.0, 1.0]]));
+    assert_eq!((scene.place_material, scene.geometry_material), (vec![1, 0, 0], vec![1, 0]));
+}
+
+#[test]
+fn spheres_stay_spheres_or_become_ellipsoids() {
     let sphere = |words: &str| {
         format!(
             "{MOVES}<Objects><Sphere id=\"1\"><Material>1</Material><Center>2</Center><Radius>3</Radius>
@@ -103,23 +136,30 @@ fn spheres_turn_and_grow_but_do_not_become_ellipsoids() {
         )
     };
     let scene = parse(&sphere("r1 s1 t1")).unwrap();
-    let [x, y, z, radius] = scene.model.sphere_sets[0][0];
+    let [x, y, z, radius] = scene.model.own.sphere_sets[0][0];
     assert!((x - 10.0).abs() < 1e-6 && (y - 2.0).abs() < 1e-6 && z == 0.0, "{x} {y} {z}");
     assert_eq!(radius, 6.0);
-    let text = complaint(&sphere("s2"));
-    assert!(text.contains("not supported yet: ellipsoid"), "{text}");
+    let scene = parse(&sphere("s2 t1")).unwrap();
+    assert_eq!(scene.model.own.sphere_count(), 0);
+    assert_eq!(scene.model.children[0].sphere_sets, [vec![[0.0, 0.0, 0.0, 1.0]]]);
+    // Around 1 0 0, of radius 3, twice as high, ten to the right.
+    let map = [3.0, 0.0, 0.0, 11.0, 0.0, 6.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0];
+    assert_eq!(scene.model.places, [Place { child: 0, object_to_world: map }]);
+    assert_eq!(scene.place_material, [0]);
+    let text = complaint(&sphere("s3"));
+    assert!(text.contains("an ellipsoid without volume"), "{text}");
 }
 
 #[test]
 fn complaints_name_the_file_the_line_and_what_is_wrong() {
     let mesh =
         |from: &str, to: &str| format!("{MOVES}<Objects>{}</Objects>", MESH.replace(from, to));
-    // The scene's own text is eight lines long, the transformations end on the twelfth.
+    // The scene's own text is eight lines long, the transformations end on the thirteenth.
     let cases = [
-        (mesh("1 2 3", "1 2 9"), ":12: <Faces>: vertex 9: expected 1 to 4"),
+        (mesh("1 2 3", "1 2 9"), ":13: <Faces>: vertex 9: expected 1 to 4"),
         (mesh("1 2 3", "1 2 0"), "vertex 0: expected 1 to 4"),
         (mesh("1 2 3", "1 2"), "2 vertex numbers: expected threes"),
-        (mesh("1 2 3", "1 2\nx"), ":13: <Faces>: `x`: expected a whole number"),
+        (mesh("1 2 3", "1 2\nx"), ":14: <Faces>: `x`: expected a whole number"),
         (mesh("<Material>2", "<Material>3"), "material 3: expected 1 to 2"),
         (mesh("t1", "t1 r7"), "`r7`: no such transformation is defined"),
         (mesh("<Faces>1 2 3</Faces>", ""), "<Mesh>: expected a <Faces> in it"),
@@ -298,15 +338,15 @@ fn the_collected_models_have_their_numbers_of_triangles() {
         ("classic/samurai_monastry.obj.xz", 124_789),
         ("classic/japanese_maple.obj.xz", 198_396),
         ("classic/teapot_stadium.xml", 18_298),
-        ("metu/grass_desert.xml", 59_054),
+        ("metu/grass_desert.xml", 4_923),
+        ("metu/marching_dragons.xml", 871_416),
+        ("metu/ellipsoids.xml", 2),
         ("metu/simple_transform.xml", 3),
         ("metu/dragon_lowres.xml", 11_969),
     ] {
         let scene = load(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(scene.model.triangle_count(), triangles, "{name}");
     }
-    let ellipsoids = load(&folder.join("metu/ellipsoids.xml")).unwrap_err().to_string();
-    assert!(ellipsoids.contains("not supported yet: ellipsoid"), "{ellipsoids}");
     let missing = load(&folder.join("metu/dragon_metal.xml")).unwrap_err().to_string();
     assert!(missing.contains("dragon_remeshed_fixed.ply: no such file"), "{missing}");
 }

@@ -26,9 +26,8 @@ fn scene(name: &str) -> Option<(RenderScene, PathBuf)> {
 fn structures(scene: &RenderScene) -> [OwnedAccel<'static>; 2] {
     type Build = for<'c> fn(&Scene<'_, 'c>, &BuildOptions) -> Result<OwnedAccel<'c>, BuildError>;
     let options = BuildOptions { plain_list: PlainList::Never, ..Default::default() };
-    [OwnedAccel::grid as Build, OwnedAccel::bvh].map(|build| {
-        scene.model.with_scene(|s| build(s, &options)).expect("a scene that can be built")
-    })
+    [OwnedAccel::grid as Build, OwnedAccel::bvh]
+        .map(|build| scene.model.build(|s| build(s, &options)).expect("a scene that can be built"))
 }
 
 fn check_mask(name: &str) {

@@ -4,10 +4,10 @@ use super::MAX_DEPTH;
 use crate::block::BvhNode;
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::math::Aabb;
-use crate::point::Nearest;
+use crate::point::Seek;
 
 /// Offers `nearest` the leaves of a binary tree, near ones first.
-pub(crate) fn search(nodes: &[BvhNode], nearest: &mut Nearest) {
+pub(crate) fn search(nodes: &[BvhNode], nearest: &mut impl Seek) {
     // One sibling a level at most, as for a ray.
     let mut stack = [(0u32, 0.0f64); MAX_DEPTH];
     let mut count = 0;
@@ -53,7 +53,7 @@ struct Level {
 /// Offers `nearest` the leaves of a tree of bundles, near ones first.
 ///
 /// On the way back distances are computed again: that takes less than a stack of them, of which most would never be taken.
-pub(crate) fn search_wide<const W: usize>(bundles: &[Bundle<W>], nearest: &mut Nearest) {
+pub(crate) fn search_wide<const W: usize>(bundles: &[Bundle<W>], nearest: &mut impl Seek) {
     let all = u32::MAX >> (32 - W);
     let mut levels = [Level { bundle: 0, left: all }; MAX_DEPTH];
     let mut depth = 0;
@@ -79,7 +79,7 @@ pub(crate) fn search_wide<const W: usize>(bundles: &[Bundle<W>], nearest: &mut N
 fn nearest_child<const W: usize>(
     bundle: &Bundle<W>,
     left: u32,
-    nearest: &Nearest,
+    nearest: &impl Seek,
 ) -> Option<(usize, ChildRef)> {
     let mut squares = [0.0; W];
     for (lane, square) in squares.iter_mut().enumerate() {

@@ -2,7 +2,7 @@
 
 use super::walk::Cells;
 use crate::block::cells::{Cell, EMPTY, GridHead, MOST_DEPTH, cell, resolution};
-use crate::point::Nearest;
+use crate::point::Seek;
 
 /// No first sphere is smaller than this part of the way to the farthest cell: grids have less than 2^10 cells along an axis.
 const LEAST_STEP: f64 = 1.0 / 4096.0;
@@ -11,7 +11,7 @@ const LEAST_STEP: f64 = 1.0 / 4096.0;
 ///
 /// The closest point of a primitive lies in a cell that lists it. A sphere twice as wide has eight times as many cells, so that the last
 /// one takes most of the time, although each begins anew.
-pub(crate) fn search(cells: &Cells, nearest: &mut Nearest) {
+pub(crate) fn search(cells: &Cells, nearest: &mut impl Seek) {
     let point = nearest.point().to_array();
     let outermost = |head: &GridHead| {
         let first = head.first_word as usize;
@@ -43,7 +43,7 @@ pub(crate) fn search(cells: &Cells, nearest: &mut Nearest) {
 }
 
 /// Offers `nearest` what one grid and the grids in its cells list within its bound.
-fn search_one(cells: &Cells, outermost: Level, point: [f64; 3], nearest: &mut Nearest) {
+fn search_one(cells: &Cells, outermost: Level, point: [f64; 3], nearest: &mut impl Seek) {
     let mut levels = [outermost; MOST_DEPTH];
     let mut depth = 0;
     loop {
@@ -68,7 +68,7 @@ fn search_one(cells: &Cells, outermost: Level, point: [f64; 3], nearest: &mut Ne
     }
 }
 
-fn visit(cells: &Cells, first: usize, nearest: &mut Nearest) {
+fn visit(cells: &Cells, first: usize, nearest: &mut impl Seek) {
     for run in cells.runs.get(first..).unwrap_or(&[]) {
         nearest.leaf(run.leaf());
         if run.is_last() {
@@ -111,7 +111,7 @@ impl Level {
     }
 
     /// The word and the place of the next cell that comes within the bound.
-    fn next(&mut self, nearest: &Nearest) -> Option<(usize, [u32; 3])> {
+    fn next(&mut self, nearest: &impl Seek) -> Option<(usize, [u32; 3])> {
         loop {
             let (row, plane) = (self.row, self.plane);
             if let Some((x, _)) = self.x.next(plane.1 + row.1, nearest) {
@@ -175,7 +175,7 @@ impl Outward {
     }
 
     /// The next cell and the square of its distance along this axis, if that and `square` come within the bound.
-    fn next(&mut self, square: f64, nearest: &Nearest) -> Option<(u32, f64)> {
+    fn next(&mut self, square: f64, nearest: &impl Seek) -> Option<(u32, f64)> {
         let gap = |gap: f64| if gap > 0.0 { gap * gap } else { 0.0 };
         let [below, above] = [self.below > 0, self.above < self.n];
         let down = if below { gap(self.point - self.wall(self.below)) } else { f64::INFINITY };

@@ -35,7 +35,7 @@ pub(super) fn fill(
     }
     let start = last.map_or(*ray, |key| from(ray, &key));
     list.gather(&Shown::own(block), &start);
-    visit_reached(level, &list.limited(&start), &mut |number| {
+    visit_reached(level, &list.limited(&start), None, &mut |number| {
         let limited = list.limited(&start);
         if let Some((shown, record)) = Shown::of(level, number, options)
             && let Some(ray) = record.object_ray(&limited)

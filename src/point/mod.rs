@@ -1,11 +1,12 @@
 //! The question of a point: what in the scene is closest to it.
 //!
-//! A structure offers [`Nearest`] the leaves whose boxes come within its [bound](Nearest::is_within), near ones
-//! first. All arithmetic is `f64` in one order of operations, whatever the structure, so the answer has the same bits
+//! A structure offers a [`Seek`] the leaves whose boxes come within its [bound](Seek::is_within), near ones
+//! first: [`Nearest`], which looks at primitives, or [`NearInstances`]. All arithmetic is `f64` in one order of operations, whatever the structure, so the answer has the same bits
 //! from all of them; how far it can be from the real one, `docs/METHODS.md` derives.
 
 mod ellipsoid;
 mod image;
+mod instances;
 mod shape;
 #[cfg(test)]
 mod tests;
@@ -18,7 +19,54 @@ use crate::math::{Aabb, Bits, wide};
 use crate::prim::Leaves;
 use crate::query::Filter;
 pub(crate) use image::Image;
+pub(crate) use instances::NearInstances;
 use shape::Foot;
+
+/// What looks for something close: a structure offers it leaves and obeys the bound. The same leaf may come again.
+pub(crate) trait Seek {
+    /// Where the point is.
+    fn point(&self) -> DVec3;
+
+    /// Whether something in a box at this distance, squared, may be the closest. True for a NaN.
+    fn is_within(&self, square: f64) -> bool;
+
+    /// Looks no farther than this for now.
+    fn look_up_to(&mut self, distance: f64);
+
+    /// Whether what is closest of all lies within this distance, or nothing does: then there is no need to look farther.
+    fn is_settled_within(&self, distance: f64) -> bool;
+
+    fn leaves(&self) -> &Leaves<'_>;
+
+    /// Considers those of `lanes` of a block that are in use.
+    fn block(&mut self, block: (u32, usize), lanes: u32);
+
+    /// The square of the distance to a box; infinite to an empty one.
+    #[inline(always)]
+    fn square_to(&self, aabb: &Aabb) -> f64 {
+        square_between(self.point(), aabb)
+    }
+
+    /// Considers the lanes of a leaf.
+    fn leaf(&mut self, leaf: LeafRef) {
+        let (kind, number) = (leaf.kind(), leaf.number());
+        let (lanes, next) = (leaf.lanes & 0xFFFF, leaf.lanes >> 16);
+        self.block((kind, number), lanes);
+        if next != 0 {
+            self.block((kind, number + 1), next);
+        }
+    }
+
+    /// Considers everything.
+    fn all(&mut self) {
+        for number in 0..self.leaves().triangle_blocks.len() {
+            self.block((KIND_TRIANGLES, number), u32::MAX);
+        }
+        for number in 0..self.leaves().sphere_blocks.len() {
+            self.block((KIND_SPHERES, number), u32::MAX);
+        }
+    }
+}
 
 /// What is closest so far.
 pub(crate) struct Nearest<'m> {
@@ -67,12 +115,6 @@ impl<'m> Nearest<'m> {
         nearest
     }
 
-    /// Looks no farther than this for now.
-    pub fn look_up_to(&mut self, distance: f64) {
-        self.sight = distance;
-        self.narrow();
-    }
-
     /// Sets the bound by how far to look, by the limit and by what is closest so far.
     fn narrow(&mut self) {
         let best = self.best.map_or(self.limit, |(_, foot)| foot.square);
@@ -80,56 +122,52 @@ impl<'m> Nearest<'m> {
         self.bound = widened * widened;
     }
 
-    /// Whether what is closest of all lies within this distance, or nothing does: then there is no need to look farther.
-    pub fn is_settled_within(&self, distance: f64) -> bool {
-        let far = self.best.map_or(self.limit, |(_, foot)| foot.square);
-        let distance = distance / self.image.shrinks();
-        far <= distance * distance
-    }
-
-    pub fn point(&self) -> DVec3 {
-        self.point
-    }
-
     /// The number of the closest primitive and the point on it.
     pub fn best(&self) -> Option<(u32, Foot)> {
         self.best
     }
 
-    /// Whether something in a box at this distance, squared, may be the closest. True for a NaN.
+    /// Keeps the closest, of equally close ones the first. A NaN is none.
+    fn consider(&mut self, place: Place, foot: Foot) {
+        let least = self.best.map_or(self.limit, |(_, best)| best.square);
+        if !(foot.square <= least) || !self.filter.sees(place, true) {
+            return;
+        }
+        let number = place.prim(self.leaves.prim_ids);
+        let first = self.best.is_none_or(|(best, _)| number < best);
+        if foot.square < least || first {
+            self.best = Some((number, foot));
+            self.narrow();
+        }
+    }
+}
+
+impl Seek for Nearest<'_> {
+    fn point(&self) -> DVec3 {
+        self.point
+    }
+
     #[inline(always)]
-    pub fn is_within(&self, square: f64) -> bool {
+    fn is_within(&self, square: f64) -> bool {
         !(square > self.bound)
     }
 
-    /// The square of the distance to a box; infinite to an empty one.
-    #[inline(always)]
-    pub fn square_to(&self, aabb: &Aabb) -> f64 {
-        square_between(self.point, aabb)
+    fn look_up_to(&mut self, distance: f64) {
+        self.sight = distance;
+        self.narrow();
     }
 
-    /// Considers all primitives.
-    pub fn all(&mut self) {
-        for number in 0..self.leaves.triangle_blocks.len() {
-            self.block((KIND_TRIANGLES, number), u32::MAX);
-        }
-        for number in 0..self.leaves.sphere_blocks.len() {
-            self.block((KIND_SPHERES, number), u32::MAX);
-        }
+    fn is_settled_within(&self, distance: f64) -> bool {
+        let far = self.best.map_or(self.limit, |(_, foot)| foot.square);
+        let distance = distance / self.image.shrinks();
+        far <= distance * distance
     }
 
-    /// Considers the lanes of a leaf.
-    pub fn leaf(&mut self, leaf: LeafRef) {
-        let (kind, number) = (leaf.kind(), leaf.number());
-        let (lanes, next) = (leaf.lanes & 0xFFFF, leaf.lanes >> 16);
-        self.block((kind, number), lanes);
-        if next != 0 {
-            self.block((kind, number + 1), next);
-        }
+    fn leaves(&self) -> &Leaves<'_> {
+        &self.leaves
     }
 
-    /// Considers those of `lanes` of a block that are in use.
-    pub fn block(&mut self, (kind, number): (u32, usize), lanes: u32) {
+    fn block(&mut self, (kind, number): (u32, usize), lanes: u32) {
         if kind == KIND_TRIANGLES {
             let Some(block) = self.leaves.triangle_blocks.get(number) else { return };
             if !self.is_within(self.square_to(&block.aabb)) {
@@ -152,25 +190,11 @@ impl<'m> Nearest<'m> {
             }
         }
     }
-
-    /// Keeps the closest, of equally close ones the first. A NaN is none.
-    fn consider(&mut self, place: Place, foot: Foot) {
-        let least = self.best.map_or(self.limit, |(_, best)| best.square);
-        if !(foot.square <= least) || !self.filter.sees(place, true) {
-            return;
-        }
-        let number = place.prim(self.leaves.prim_ids);
-        let first = self.best.is_none_or(|(best, _)| number < best);
-        if foot.square < least || first {
-            self.best = Some((number, foot));
-            self.narrow();
-        }
-    }
 }
 
 /// The square of the distance of a point and a box; infinite for an empty one.
 #[inline(always)]
-pub(crate) fn square_between(point: DVec3, aabb: &Aabb) -> f64 {
+fn square_between(point: DVec3, aabb: &Aabb) -> f64 {
     let (below, above) = (wide(aabb.lower) - point, point - wide(aabb.upper));
     let gap = |a: f64, b: f64| {
         let gap = if a > b { a } else { b };

@@ -185,12 +185,14 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
+        if Q::OF_INDEX {
+            return Bits(lanes).any(|lane| {
+                let place = Place::of_lane(number as u32, block.first, lane as u32);
+                query.instance(place.prim(self.prim_ids))
+            });
+        }
         query.watch().block(lanes.count_ones());
         Bits(lanes).any(|lane| {
-            if Q::OF_INDEX {
-                let place = Place::of_lane(number as u32, block.first, lane as u32);
-                return query.instance(place.prim(self.prim_ids));
-            }
             let (centre, radius) = block.sphere(lane);
             sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
                 let place = Place::of_lane(number as u32, block.first, lane as u32);

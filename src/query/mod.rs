@@ -25,7 +25,7 @@ use crate::sieve::SphereDetail;
 /// What a query did, for charts and heat maps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Boxes of BVH nodes, or cells of a grid, looked at.
+    /// Boxes of BVH nodes, or cells of a grid, looked at; those of an index over instances too.
     pub steps: u64,
     /// Leaf blocks opened.
     pub blocks: u64,
@@ -61,6 +61,8 @@ pub(crate) trait Watch {
     fn exact(&mut self) {}
     /// The rounding of the answer took real arithmetic.
     fn rounding(&mut self) {}
+    /// So many boxes and cells were looked at unwatched.
+    fn steps(&mut self, _count: u64) {}
 }
 
 impl Watch for () {
@@ -100,6 +102,10 @@ impl Watch for &mut Counts {
 
     fn rounding(&mut self) {
         self.roundings += 1;
+    }
+
+    fn steps(&mut self, count: u64) {
+        self.steps += count;
     }
 }
 

@@ -69,7 +69,7 @@ pub fn all() -> Vec<(String, Maker)> {
 fn from_file(file: &'static str, count: usize) -> Option<Subject> {
     let path = shared_scenes::folder(None)?.join(file);
     match load(&path) {
-        Ok(scene) => Some(ordinary(file, scene.model, count)),
+        Ok(scene) => Some(ordinary(file, scene.model.flattened()?, count)),
         Err(error) => {
             eprintln!("{error}");
             None

@@ -1,17 +1,21 @@
 //! What a picture is made of: geometry, materials, lights, cameras.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+use raykern::Hit;
 
 use super::camera::Camera;
+use crate::assembly::Assembly;
 use crate::model::Model;
 
 /// Everything a picture needs. Colours count from 0 to 255.
 #[derive(Clone, Debug)]
 pub struct RenderScene {
-    /// The geometry, instances flattened.
-    pub model: Model,
-    /// For each geometry of the model its number in `materials`.
+    /// The geometry.
+    pub model: Assembly,
+    /// For each geometry of the model itself its number in `materials`.
     pub geometry_material: Vec<usize>,
+    /// For each of its places the number of what is seen there.
+    pub place_material: Vec<usize>,
     /// The materials.
     pub materials: Vec<Material>,
     /// The point lights.
@@ -117,8 +121,9 @@ impl RenderScene {
         let intensity = DVec3::splat(230.0 * (lamp - center).length_squared());
         let geometries = model.meshes.len() + model.sphere_sets.len();
         RenderScene {
-            model,
+            model: model.into(),
             geometry_material: vec![0; geometries],
+            place_material: Vec::new(),
             materials: vec![Material::matte([0.8; 3])],
             lights: vec![PointLight { position: lamp, intensity }],
             ambient: DVec3::splat(20.0),
@@ -128,6 +133,57 @@ impl RenderScene {
             intersection_epsilon: 0.0,
             max_recursion_depth: 0,
         }
+    }
+
+    /// The same scene without places, [flattened](Assembly::flattened); `None` if there are ellipsoids.
+    pub fn flattened(&self) -> Option<RenderScene> {
+        let model = self.model.flattened()?;
+        let shown = |count: fn(&Model) -> usize| {
+            let places = self.model.places.iter().zip(&self.place_material);
+            places.flat_map(move |(place, material)| {
+                std::iter::repeat_n(*material, count(&self.model.children[place.child]))
+            })
+        };
+        let (meshes, spheres) = self.geometry_material.split_at(self.model.own.meshes.len());
+        let mut geometry_material = meshes.to_vec();
+        geometry_material.extend(shown(|child| child.meshes.len()));
+        geometry_material.extend(spheres);
+        geometry_material.extend(shown(|child| child.sphere_sets.len()));
+        let (model, place_material) = (model.into(), Vec::new());
+        Some(RenderScene { model, geometry_material, place_material, ..self.clone() })
+    }
+
+    /// What is met.
+    pub fn material(&self, hit: &Hit) -> &Material {
+        let number = match self.place_material.get(hit.instance as usize) {
+            Some(number) => *number,
+            None => self.geometry_material[hit.geometry as usize],
+        };
+        &self.materials[number]
+    }
+
+    /// The unit normal at `position`, which was met: that of the triangle's order, or outward.
+    pub fn normal(&self, hit: &Hit, position: DVec3) -> DVec3 {
+        let (model, map) = match self.model.places.get(hit.instance as usize) {
+            Some(place) => (&self.model.children[place.child], place.map()),
+            None => (&self.model.own, DAffine3::IDENTITY),
+        };
+        let (geometry, prim) = (hit.geometry as usize, hit.prim as usize);
+        let wide = |p: [f32; 3]| DVec3::from(p.map(f64::from));
+        let normal = match model.meshes.get(geometry) {
+            Some(mesh) => {
+                let corner = |v: u32| map.transform_point3(wide(mesh.vertices[v as usize]));
+                let [a, b, c] = mesh.indices[prim].map(corner);
+                (b - a).cross(c - a)
+            }
+            None => {
+                let [x, y, z, _] = model.sphere_sets[geometry - model.meshes.len()][prim];
+                let inverse = map.inverse();
+                let normal = inverse.transform_point3(position) - wide([x, y, z]);
+                inverse.matrix3.transpose() * normal
+            }
+        };
+        normal.normalize_or_zero()
     }
 }
 

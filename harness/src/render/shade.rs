@@ -58,7 +58,7 @@ impl<'a, T: Tracer> Shader<'a, T> {
     fn shade(&mut self, ray: &Ray, hit: &Hit, depth: u32) -> DVec3 {
         let point = self.point(ray, hit);
         let scene = self.scene;
-        let material = &scene.materials[scene.geometry_material[hit.geometry as usize]];
+        let material = scene.material(hit);
         let local =
             if point.is_inside_of(material) { DVec3::ZERO } else { self.local(&point, material) };
         if depth >= scene.max_recursion_depth {
@@ -142,24 +142,12 @@ impl<'a, T: Tracer> Shader<'a, T> {
         share * reflected + (1.0 - share) * fade(color, length, !inside)
     }
 
-    /// The point of a hit, computed in f64 from the ray and the triangle's own vertices.
+    /// The point of a hit, computed in f64 from the ray, and the normal from what is met.
     fn point(&self, ray: &Ray, hit: &Hit) -> Point {
         let [origin, step] = [ray.origin, ray.direction].map(|v| DVec3::from(v.map(f64::from)));
         let position = origin + f64::from(hit.t) * step;
-        let model = &self.scene.model;
-        let (geometry, prim) = (hit.geometry as usize, hit.prim as usize);
-        let normal = match model.meshes.get(geometry) {
-            Some(mesh) => {
-                let corner = |v: u32| DVec3::from(mesh.vertices[v as usize].map(f64::from));
-                let [a, b, c] = mesh.indices[prim].map(corner);
-                (b - a).cross(c - a)
-            }
-            None => {
-                let [x, y, z, _] = model.sphere_sets[geometry - model.meshes.len()][prim];
-                position - DVec3::from([x, y, z].map(f64::from))
-            }
-        };
-        Point { position, normal: normal.normalize_or_zero(), direction: step.normalize() }
+        let normal = self.scene.normal(hit, position);
+        Point { position, normal, direction: step.normalize() }
     }
 }
 

@@ -1,10 +1,11 @@
 //! Scenes of the METU ray tracing courses (CENG 477 and 795): XML with meshes inline or in PLY.
 //!
 //! Right-handed; vertices count from one; materials are taken by their position in the file, since
-//! their ids may repeat; of several transformations the first named acts first. Instances are
-//! flattened: their vertices are mapped in f64 and rounded once. Elements that are not known are
-//! passed over.
+//! their ids may repeat; of several transformations the first named acts first. A mesh that is shown
+//! more than once is stored once, and so is the unit sphere that all ellipsoids are made of; other vertices are mapped in f64 and
+//! rounded once. Elements that are not known are passed over.
 
+mod chain;
 mod objects;
 mod transform;
 mod xml;
@@ -14,6 +15,7 @@ use std::path::Path;
 use glam::DVec3;
 use roxmltree::{Document, Node};
 
+use self::objects::Objects;
 use self::xml::{File, child, group};
 use super::{LoadError, xz};
 use crate::render::{Camera, Material, MaterialKind, PointLight, RenderScene};
@@ -39,10 +41,12 @@ pub fn parse(path: &Path, text: &str) -> Result<RenderScene, LoadError> {
         return Err(file.error(scene, "expected <Scene> as the outermost element"));
     }
     let materials = materials(file, scene)?;
-    let (model, geometry_material) = objects::read(file, scene, materials.len())?;
+    let Objects { model, geometry_material, place_material } =
+        objects::read(file, scene, materials.len())?;
     Ok(RenderScene {
         model,
         geometry_material,
+        place_material,
         materials,
         lights: lights(file, scene)?,
         ambient: match child(scene, "Lights") {

@@ -1,15 +1,28 @@
-//! Meshes, instances of meshes, lone triangles and spheres.
+//! What there is to hit: meshes, instances of meshes, lone triangles and spheres.
 
-use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
 
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 
-use super::transform::{Transformations, even_scale};
-use super::xml::{File, child, group, name};
+use super::chain;
+use super::transform::Transformations;
+use super::xml::{File, child, group};
+use crate::assembly::{Assembly, Place, moved_sphere};
 use crate::load::{LoadError, load_mesh};
 use crate::model::{Model, TriangleMesh};
+
+/// The geometry of a scene, and the numbers of its materials.
+///
+/// Geometries: each mesh that is shown once in the order of the file, then the lone triangles of each
+/// material as one mesh, then the spheres of each material as one set. Places: those of meshes in the order of the file, then
+/// ellipsoids.
+#[derive(Default)]
+pub struct Objects {
+    pub model: Assembly,
+    pub geometry_material: Vec<usize>,
+    pub place_material: Vec<usize>,
+}
 
 /// What all objects refer to.
 struct Context<'a> {
@@ -19,46 +32,72 @@ struct Context<'a> {
     material_count: usize,
 }
 
-/// A `<Mesh>` or a `<MeshInstance>` before it is flattened.
-struct Object<'a, 'i> {
-    node: Node<'a, 'i>,
-    own: DAffine3,
-    base: Option<Base>,
+/// A mesh that may be shown more than once.
+enum Shared {
+    /// By instances of this child.
+    Child(usize),
+    /// By copies: it has few triangles, or is shown once.
+    Copied(TriangleMesh),
 }
 
-/// What an instance is an instance of.
-struct Base {
-    id: u32,
-    reset: bool,
-}
+/// With fewer triangles copies take less memory than instances, some 470 bytes each, and are faster.
+const FEW: usize = 16;
 
-/// The geometry under `scene`, and for each geometry of it the number of its material.
-///
-/// Geometries: every mesh and instance in the order of the file, then the lone triangles of each
-/// material as one mesh, then the spheres of each material as one set.
-pub fn read(
-    file: File,
-    scene: Node,
-    material_count: usize,
-) -> Result<(Model, Vec<usize>), LoadError> {
+/// The geometry under `scene`.
+pub fn read(file: File, scene: Node, material_count: usize) -> Result<Objects, LoadError> {
     let context = Context {
         file,
         vertices: vertex_data(file, scene)?,
         transformations: Transformations::read(file, scene)?,
         material_count,
     };
-    let mut model = Model::default();
-    let mut geometry_material = Vec::new();
-    context.meshes(scene, &mut model, &mut geometry_material)?;
+    let mut objects = Objects::default();
+    context.meshes(scene, &mut objects)?;
     for (material, triangles) in context.triangles(scene)? {
-        model.meshes.push(triangles);
-        geometry_material.push(material);
+        objects.mesh(triangles, material);
     }
-    for (material, spheres) in context.spheres(scene)? {
-        model.sphere_sets.push(spheres);
-        geometry_material.push(material);
+    context.spheres(scene, &mut objects)?;
+    Ok(objects)
+}
+
+impl Objects {
+    fn mesh(&mut self, mesh: TriangleMesh, material: usize) {
+        self.model.own.meshes.push(mesh);
+        self.geometry_material.push(material);
     }
-    Ok((model, geometry_material))
+
+    fn child(&mut self, child: Model) -> usize {
+        self.model.children.push(child);
+        self.model.children.len() - 1
+    }
+
+    fn place(&mut self, place: Place, material: usize) {
+        self.model.places.push(place);
+        self.place_material.push(material);
+    }
+
+    /// Keeps a mesh that will be shown so many times.
+    fn share(&mut self, mesh: TriangleMesh, times: usize) -> Shared {
+        match times == 1 || mesh.indices.len() < FEW {
+            true => Shared::Copied(mesh),
+            false => Shared::Child(self.child(mesh.into())),
+        }
+    }
+
+    /// Shows a mesh once more.
+    fn show(&mut self, shared: &Shared, map: &DAffine3, material: usize) {
+        match shared {
+            Shared::Copied(mesh) => self.mesh(mesh.placed_by(map), material),
+            Shared::Child(child) => match Place::new(*child, map) {
+                Some(place) => self.place(place, material),
+                // Flat ones have no place.
+                None => {
+                    let flat = self.model.children[*child].meshes[0].placed_by(map);
+                    self.mesh(flat, material);
+                }
+            },
+        }
+    }
 }
 
 fn vertex_data(file: File, scene: Node) -> Result<Vec<[f32; 3]>, LoadError> {
@@ -72,78 +111,21 @@ fn vertex_data(file: File, scene: Node) -> Result<Vec<[f32; 3]>, LoadError> {
 }
 
 impl Context<'_> {
-    fn meshes(
-        &self,
-        scene: Node,
-        model: &mut Model,
-        geometry_material: &mut Vec<usize>,
-    ) -> Result<(), LoadError> {
-        let objects = self.objects(scene)?;
-        let ids = ids(self.file, &objects)?;
-        let mut loaded: HashMap<usize, TriangleMesh> = HashMap::new();
-        for number in 0..objects.len() {
-            let (source, map) = self.resolve(&objects, &ids, number)?;
-            let mesh = match loaded.entry(source) {
-                Entry::Occupied(known) => known.into_mut(),
-                Entry::Vacant(new) => new.insert(self.faces(objects[source].node)?),
+    fn meshes(&self, scene: Node, objects: &mut Objects) -> Result<(), LoadError> {
+        let shown = chain::read(self.file, scene, &self.transformations)?;
+        let mut times = HashMap::<usize, usize>::new();
+        shown.iter().for_each(|(_, mesh, _)| *times.entry(*mesh).or_default() += 1);
+        let mut shared = HashMap::<usize, Shared>::new();
+        for (object, mesh, map) in &shown {
+            let material = self.material(object.node)?;
+            let known = match shared.remove(mesh) {
+                Some(known) => known,
+                None => objects.share(self.faces(shown[*mesh].0.node)?, times[mesh]),
             };
-            model.meshes.push(moved(mesh, &map));
-            geometry_material.push(self.material(objects[number].node)?);
+            objects.show(&known, map, material);
+            shared.insert(*mesh, known);
         }
         Ok(())
-    }
-
-    fn objects<'a, 'i>(&self, scene: Node<'a, 'i>) -> Result<Vec<Object<'a, 'i>>, LoadError> {
-        let nodes = child(scene, "Objects").into_iter().flat_map(|n| n.children());
-        nodes
-            .filter(|n| matches!(name(*n), "Mesh" | "MeshInstance"))
-            .map(|node| {
-                let own = self.transformations.of(self.file, node)?;
-                let base = (name(node) == "MeshInstance").then(|| self.base(node)).transpose()?;
-                Ok(Object { node, own, base })
-            })
-            .collect()
-    }
-
-    fn base(&self, node: Node) -> Result<Base, LoadError> {
-        let missing = || self.file.error(node, "expected an attribute `baseMeshId`");
-        let reset = match node.attribute("resetTransform") {
-            None | Some("false") => false,
-            Some("true") => true,
-            Some(other) => {
-                let problem = format!("resetTransform=\"{other}\": expected true or false");
-                return Err(self.file.error(node, problem));
-            }
-        };
-        let id = self.file.attribute(node, "baseMeshId")?.ok_or_else(missing)?;
-        Ok(Base { id, reset })
-    }
-
-    /// The mesh that object `number` shows, and where: follows the chain of instances.
-    fn resolve(
-        &self,
-        objects: &[Object],
-        ids: &HashMap<u32, Option<usize>>,
-        number: usize,
-    ) -> Result<(usize, DAffine3), LoadError> {
-        let mut map = DAffine3::IDENTITY;
-        let (mut at, mut reset) = (number, false);
-        for _ in 0..=objects.len() {
-            let object = &objects[at];
-            if !reset {
-                map *= object.own;
-            }
-            let Some(base) = &object.base else { return Ok((at, map)) };
-            reset |= base.reset;
-            let error =
-                |what| self.file.error(object.node, format!("baseMeshId {}: {what}", base.id));
-            at = match ids.get(&base.id) {
-                Some(Some(next)) => *next,
-                Some(None) => return Err(error("several meshes have this id")),
-                None => return Err(error("no mesh has this id")),
-            };
-        }
-        Err(self.file.error(objects[number].node, "the instances refer to each other in a circle"))
     }
 
     /// The triangles of a `<Mesh>`, with the vertices they use, as they are before any map.
@@ -196,30 +178,48 @@ impl Context<'_> {
                 triangle.vertices.push(self.vertices[vertex]);
             }
             let map = self.transformations.of(self.file, object)?;
-            meshes.entry(self.material(object)?).or_default().append(&moved(&triangle, &map));
+            meshes.entry(self.material(object)?).or_default().append(&triangle.placed_by(&map));
         }
         Ok(meshes)
     }
 
-    /// The spheres, by material.
-    fn spheres(&self, scene: Node) -> Result<BTreeMap<usize, Vec<[f32; 4]>>, LoadError> {
+    /// The spheres, those of each material as one set, and ellipsoids at places of one unit sphere.
+    fn spheres(&self, scene: Node, objects: &mut Objects) -> Result<(), LoadError> {
         let mut sets: BTreeMap<usize, Vec<[f32; 4]>> = BTreeMap::new();
+        let mut unit = None;
         for object in group(scene, "Objects", "Sphere") {
-            let node = self.file.child(object, "Center")?;
-            let numbers = self.file.list::<i64>(node)?;
-            let [number] = numbers.as_slice() else {
-                let problem = format!("{} numbers: expected one vertex number", numbers.len());
-                return Err(self.file.error(node, problem));
-            };
-            let center = self.vertices[self.vertex(node, *number)?];
-            let radius = self.file.number(self.file.child(object, "Radius")?)?;
+            let (centre, radius) = self.sphere(object)?;
             let map = self.transformations.of(self.file, object)?;
-            let sphere = moved_sphere(center, radius, &map).ok_or_else(|| {
-                self.file.error(object, "not supported yet: ellipsoid (unevenly scaled sphere)")
-            })?;
-            sets.entry(self.material(object)?).or_default().push(sphere);
+            let material = self.material(object)?;
+            if let Some(sphere) = moved_sphere(centre, radius, &map) {
+                sets.entry(material).or_default().push(sphere);
+                continue;
+            }
+            let one = || Model { meshes: vec![], sphere_sets: vec![vec![[0.0, 0.0, 0.0, 1.0]]] };
+            let unit = *unit.get_or_insert_with(|| objects.child(one()));
+            let centre = DAffine3::from_translation(DVec3::from(centre.map(f64::from)));
+            let grown = map * centre * DAffine3::from_scale(DVec3::splat(radius));
+            let place = Place::new(unit, &grown)
+                .ok_or_else(|| self.file.error(object, "an ellipsoid without volume"))?;
+            objects.place(place, material);
         }
-        Ok(sets)
+        for (material, spheres) in sets {
+            objects.model.own.sphere_sets.push(spheres);
+            objects.geometry_material.push(material);
+        }
+        Ok(())
+    }
+
+    /// Centre and radius of a `<Sphere>`, before any map.
+    fn sphere(&self, object: Node) -> Result<([f32; 3], f64), LoadError> {
+        let node = self.file.child(object, "Center")?;
+        let numbers = self.file.list::<i64>(node)?;
+        let [number] = numbers.as_slice() else {
+            let problem = format!("{} numbers: expected one vertex number", numbers.len());
+            return Err(self.file.error(node, problem));
+        };
+        let centre = self.vertices[self.vertex(node, *number)?];
+        Ok((centre, self.file.number(self.file.child(object, "Radius")?)?))
     }
 
     /// The number from zero of the vertex that `number` names.
@@ -241,31 +241,4 @@ impl Context<'_> {
             _ => Err(self.file.error(node, format!("material {number}: expected 1 to {count}"))),
         }
     }
-}
-
-/// Which object an id means; `None` when several have it.
-fn ids(file: File, objects: &[Object]) -> Result<HashMap<u32, Option<usize>>, LoadError> {
-    let mut ids = HashMap::new();
-    for (number, object) in objects.iter().enumerate() {
-        if let Some(id) = file.attribute::<u32>(object.node, "id")? {
-            ids.entry(id).and_modify(|known| *known = None).or_insert(Some(number));
-        }
-    }
-    Ok(ids)
-}
-
-/// The mesh with every vertex mapped in f64 and rounded; unchanged bits under the identity.
-fn moved(mesh: &TriangleMesh, map: &DAffine3) -> TriangleMesh {
-    if *map == DAffine3::IDENTITY {
-        return mesh.clone();
-    }
-    mesh.clone().mapped(|p| map.transform_point3(DVec3::from(p)).to_array())
-}
-
-/// The sphere `map` makes of a sphere, unless that is an ellipsoid.
-fn moved_sphere(center: [f32; 3], radius: f64, map: &DAffine3) -> Option<[f32; 4]> {
-    let scale = even_scale(map)?;
-    let center = map.transform_point3(DVec3::from(center.map(f64::from)));
-    let [x, y, z] = center.as_vec3().to_array();
-    Some([x, y, z, (radius * scale) as f32])
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::{DAffine3, DMat3, DMat4, DVec3};
+use glam::{DAffine3, DMat4, DVec3};
 use roxmltree::Node;
 
 use super::xml::{File, child, name};
@@ -64,15 +64,4 @@ fn composite(file: File, node: Node) -> Result<DAffine3, LoadError> {
         return Err(file.error(node, "the last row is not 0 0 0 1: only affine maps are supported"));
     }
     Ok(DAffine3::from_mat4(columns))
-}
-
-/// The factor by which `map` scales all lengths, or `None` when it scales unevenly.
-///
-/// "Evenly" leaves room for the rounding of rotations: 1e-9 of the square of the factor.
-pub fn even_scale(map: &DAffine3) -> Option<f64> {
-    let product = map.matrix3.transpose() * map.matrix3;
-    let square = product.x_axis.x;
-    let error = product - DMat3::from_diagonal(DVec3::splat(square));
-    let worst = error.to_cols_array().into_iter().fold(0.0, |a: f64, b| a.max(b.abs()));
-    (worst <= 1e-9 * square).then(|| square.sqrt())
 }

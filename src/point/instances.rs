@@ -1,0 +1,105 @@
+//! The question of a point to an index: which instances come close.
+
+use glam::DVec3;
+
+use super::{SLACK, Seek, square_between};
+use crate::block::leaf::{KIND_SPHERES, Place};
+use crate::block::level::Level;
+use crate::math::float::sqrt;
+use crate::math::wide;
+use crate::prim::{Lanes, Leaves};
+use crate::ray::NONE;
+
+/// What is done for each instance that may be the closest: it gets the number, and returns the square of the distance beyond
+/// which nothing is of interest any more.
+type Visit<'v> = dyn FnMut(u32) -> f64 + 'v;
+
+/// So many instances that were visited are remembered: a grid lists one in each of its cells.
+const MAILBOX: usize = 32;
+
+/// Visits instances, near ones first as far as the index is ordered.
+pub(crate) struct NearInstances<'a, 'm, 'v> {
+    level: &'a Level<'m>,
+    leaves: Leaves<'m>,
+    point: DVec3,
+    /// What distances to boxes and cells may be off.
+    slack: f64,
+    /// The square of the distance up to which instances count.
+    limit: f64,
+    /// How far to look for now, and the square of the distance beyond which no box is of interest.
+    sight: f64,
+    bound: f64,
+    /// The last that were visited, by number.
+    visited: [u32; MAILBOX],
+    visit: &'a mut Visit<'v>,
+}
+
+impl<'a, 'm, 'v> NearInstances<'a, 'm, 'v> {
+    /// Nothing visited yet; what is not farther from `point` than the root of `limit` counts.
+    pub fn new(
+        level: &'a Level<'m>,
+        point: [f32; 3],
+        limit: f64,
+        visit: &'a mut Visit<'v>,
+    ) -> Self {
+        let (point, index) = (wide(point), level.index.parts());
+        let size = point.abs().max_element() + f64::from(index.header.reach);
+        let (leaves, slack) = (Leaves::of(&index), size * SLACK);
+        let (sight, bound, visited) = (f64::INFINITY, 0.0, [NONE; MAILBOX]);
+        let mut near =
+            NearInstances { level, leaves, point, slack, limit, sight, bound, visited, visit };
+        near.narrow();
+        near
+    }
+
+    fn narrow(&mut self) {
+        let widened = self.sight.min(sqrt(self.limit)) + self.slack;
+        self.bound = widened * widened;
+    }
+
+    /// Visits an instance if its box comes within the bound.
+    pub fn consider(&mut self, number: u32) {
+        let slot = number as usize % MAILBOX;
+        let Some(record) = self.level.instances.get(number as usize) else { return };
+        let square = square_between(self.point, &record.bounds);
+        if self.visited[slot] != number && self.is_within(square) {
+            self.visited[slot] = number;
+            self.limit = (self.visit)(number);
+            self.narrow();
+        }
+    }
+}
+
+impl Seek for NearInstances<'_, '_, '_> {
+    fn point(&self) -> DVec3 {
+        self.point
+    }
+
+    #[inline(always)]
+    fn is_within(&self, square: f64) -> bool {
+        !(square > self.bound)
+    }
+
+    fn look_up_to(&mut self, distance: f64) {
+        self.sight = distance;
+        self.narrow();
+    }
+
+    fn is_settled_within(&self, distance: f64) -> bool {
+        self.limit <= distance * distance
+    }
+
+    fn leaves(&self) -> &Leaves<'_> {
+        &self.leaves
+    }
+
+    fn block(&mut self, (kind, number): (u32, usize), lanes: u32) {
+        let Leaves { sphere_blocks, prim_ids, .. } = self.leaves;
+        let Some(block) = sphere_blocks.get(number).filter(|_| kind == KIND_SPHERES) else {
+            return;
+        };
+        for lane in Lanes(lanes & block.lanes()) {
+            self.consider(Place::of_lane(number as u32, block.first, lane as u32).prim(prim_ids));
+        }
+    }
+}
