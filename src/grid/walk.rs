@@ -1,9 +1,9 @@
 //! The walk of a ray through the cells.
 
 use super::ray::CellRay;
-use super::steps::{Level, Part};
+use super::steps::{Level, Sides};
 use crate::block::cells::{
-    Cell, EMPTY, GridHead, MOST_DEPTH, Run, SIDES, cell, resolution, side_ahead,
+    Cell, CellBox, EMPTY, GridHead, MOST_DEPTH, Run, SIDES, cell, resolution, side_ahead,
 };
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
@@ -32,6 +32,10 @@ pub(crate) fn walk<S: Simd, Q: Query>(
     query: &mut Q,
 ) -> bool {
     for head in cells.grids {
+        let part = slab.part(&head.bounds, query.t_bound());
+        if part.is_empty() {
+            continue;
+        }
         let first = head.first_word as usize;
         let Some(n) = cells.words.get(first).map(|word| resolution(*word)) else { continue };
         if n == [1; 3] {
@@ -39,7 +43,7 @@ pub(crate) fn walk<S: Simd, Q: Query>(
             query.watch().step();
             let word = cells.words.get(first + 1).copied().unwrap_or(EMPTY);
             if let Cell::Run(run) = cell(word) {
-                if visit(s, cells, run, ray, slab, query) {
+                if visit(s, cells, run, EVER, ray, slab, query) {
                     return true;
                 }
                 continue;
@@ -49,20 +53,27 @@ pub(crate) fn walk<S: Simd, Q: Query>(
         if !cell_ray.is_near(head.finest) {
             return from_afar(cells, ray, query);
         }
-        let [enter, exit] = cell_ray.times();
-        let t_min = f64::from(ray.t_min);
-        let start = if t_min > enter { t_min } else { enter };
-        let t_bound = query.t_bound();
-        if !(start <= exit && start <= f64::from(t_bound)) {
-            continue;
+        let mut part = [f64::from(part.near), f64::from(part.far)];
+        if !cell_ray.holds(cell_ray.at(part[0])) {
+            part = cell_ray.part(part);
+            if !(part[0] <= part[1]) {
+                continue;
+            }
         }
-        let part = Part { start, exit };
-        let level = Level::outermost(s, &cell_ray, head.first_word, part, t_bound);
-        if walk_one(s, cells, level, cell_ray.turned, ray, slab, query) {
+        let [start, exit] = part;
+        let (from, exit) = (cell_ray.at(start), time_above(exit, start));
+        let level = Level::outermost(s, &cell_ray, head.first_word, from, exit);
+        if walk_one(s, cells, level, (start, cell_ray.turned), ray, slab, query) {
             return true;
         }
     }
     false
+}
+
+/// The time from `start` to `t`, rounded up if it is not negative.
+#[inline(always)]
+pub(super) fn time_above(t: f64, start: f64) -> f32 {
+    ((t - start) * (1.0 + 1.0 / (1u64 << 22) as f64)) as f32
 }
 
 /// For a ray from so far away that not even `f64` tells its cells apart: every block is tested through its box.
@@ -72,66 +83,94 @@ fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool 
     cells.leaves.intersect_all(Scalar, ray, &WideSlab::new(ray), query)
 }
 
-/// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search.
+/// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search. Times are counted from `start`.
 #[inline(always)]
 fn walk_one<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
     mut level: Level<<S as Width<4>>::V>,
-    turned: [u32; 3],
+    (start, turned): (f64, [u32; 3]),
     ray: &PreparedRay,
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     let octant = turned[0] & 1 | turned[1] & 2 | turned[2] & 4;
-    let mut outer = [level; MOST_DEPTH - 1];
+    let sides = Sides::new(s, turned);
+    // Where to go on behind inner grids.
+    let mut outer = [None; MOST_DEPTH - 1];
     let mut depth = 0;
+    let bound_of = |t_bound: f32| Width::<4>::splat(s, time_above(f64::from(t_bound), start));
+    let mut t_bound = query.t_bound();
+    let mut bound = bound_of(t_bound);
     loop {
         query.watch().step();
         let word = cells.words.get(level.place as usize).copied().unwrap_or(EMPTY);
-        let mut goes_on = true;
-        match cell(word) {
+        let goes_on = match cell(word) {
             Cell::Empty => {
                 let side = side_ahead(word, octant);
-                goes_on = if side > 0 { level.jump(s, SIDES[side]) } else { level.step(s) };
+                if side > 0 { level.jump(s, SIDES[side], bound) } else { level.step(s, bound) }
             }
             Cell::Run(first) => {
-                if visit(s, cells, first, ray, slab, query) {
+                if visit(s, cells, first, EVER, ray, slab, query) {
                     return true;
                 }
-                level.look_up_to(s, query.t_bound());
-                goes_on = level.step(s);
+                if query.t_bound() < t_bound {
+                    t_bound = query.t_bound();
+                    bound = bound_of(t_bound);
+                }
+                level.step(s, bound)
             }
             Cell::Grid(first) => {
                 // A sound block has neither grids outside the words nor deeper ones.
-                let n = cells.words.get(first).map(|word| resolution(*word));
-                if let (Some(n), Some(place)) = (n, outer.get_mut(depth)) {
-                    *place = level;
+                let n = cells.words.get(first).map_or([1; 3], |word| resolution(*word));
+                let inner = level.inner(s, (first as u32, n), turned);
+                if level.step(s, bound)
+                    && let Some(place) = outer.get_mut(depth)
+                {
+                    *place = Some(level);
                     depth += 1;
-                    level = level.inner(s, (first as u32, n), turned, query.t_bound());
                 }
+                level = inner;
+                true
             }
-            Cell::Unknown => return false,
-        }
-        while !goes_on {
-            if depth == 0 || level.ends_before_exit(query.t_bound()) {
+            Cell::Boxed(first) => {
+                let cell_box = cells.runs.get(first).map_or(CellBox::WHOLE, |run| run.cell_box());
+                if let Some(part) = level.part_in(s, cell_box, sides, bound) {
+                    let part = part.map(|t| (start + f64::from(t)) as f32);
+                    if visit(s, cells, first + 1, part, ray, slab, query) {
+                        return true;
+                    }
+                    if query.t_bound() < t_bound {
+                        t_bound = query.t_bound();
+                        bound = bound_of(t_bound);
+                    }
+                }
+                level.step(s, bound)
+            }
+        };
+        if !goes_on {
+            depth = depth.wrapping_sub(1);
+            let Some(Some(next)) = outer.get(depth) else { return false };
+            // Those before it on the stack come later still.
+            if !next.begins_before(bound) {
                 return false;
             }
-            depth -= 1;
-            level = outer[depth];
-            level.look_up_to(s, query.t_bound());
-            goes_on = level.step(s);
+            level = *next;
         }
     }
 }
 
-/// Offers `query` what the ray meets among the primitives of a run, block by block if it comes into their boxes: in a cell's corner
-/// there may be little of it.
+/// All of a ray.
+const EVER: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
+/// Offers `query` what the ray meets among the primitives of a run, block by block if it comes into their boxes in a part of
+/// it: in a cell's corner there may be little of a block.
 #[inline(always)]
 fn visit<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
     first: usize,
+    [begin, end]: [f32; 2],
     ray: &PreparedRay,
     slab: &impl Slab,
     query: &mut Q,
@@ -139,9 +178,9 @@ fn visit<S: Simd, Q: Query>(
     for run in cells.runs.get(first..).unwrap_or(&[]) {
         let leaf = run.leaf();
         let aabb = cells.leaves.aabb((leaf.kind(), leaf.number()));
-        if !slab.part(&aabb, query.t_bound()).is_empty()
-            && cells.leaves.intersect(s, leaf, ray, query)
-        {
+        let t_bound = query.t_bound();
+        let part = slab.part(&aabb, if end < t_bound { end } else { t_bound });
+        if !(part.is_empty() || part.far < begin) && cells.leaves.intersect(s, leaf, ray, query) {
             return true;
         }
         if run.is_last() {
