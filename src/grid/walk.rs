@@ -56,6 +56,7 @@ pub(crate) fn walk<S: Simd, Q: Query>(
         let mut part = [f64::from(part.near), f64::from(part.far)];
         if !cell_ray.holds(cell_ray.at(part[0])) {
             part = cell_ray.part(part);
+            // Written so that a NaN, from foreign bytes, ends it.
             if !(part[0] <= part[1]) {
                 continue;
             }
@@ -70,10 +71,11 @@ pub(crate) fn walk<S: Simd, Q: Query>(
     false
 }
 
-/// The time from `start` to `t`, rounded up if it is not negative.
+/// The time from `start` to `t`, rounded up if it is not negative. Finite, as walls that are never passed are beyond it.
 #[inline(always)]
 pub(super) fn time_above(t: f64, start: f64) -> f32 {
-    ((t - start) * (1.0 + 1.0 / (1u64 << 22) as f64)) as f32
+    let time = ((t - start) * (1.0 + 1.0 / (1u64 << 22) as f64)) as f32;
+    if time < f32::MAX { time } else { f32::MAX }
 }
 
 /// For a ray from so far away that not even `f64` tells its cells apart: every block is tested through its box.
