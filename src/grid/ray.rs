@@ -69,21 +69,17 @@ impl CellRay {
     /// Where the ray is at `t`.
     #[inline(always)]
     pub fn at(&self, t: f64) -> [f32; 3] {
-        let mut at = [0.0; 3];
-        for k in 0..3 {
-            at[k] = (self.origin[k] + t * self.direction[k]) as f32;
-        }
-        at
+        let ([x, y, z], [dx, dy, dz]) = (self.origin, self.direction);
+        [(x + t * dx) as f32, (y + t * dy) as f32, (z + t * dz) as f32]
     }
 
     /// Whether a point is in the grid, or at most a quarter of a cell outside.
     #[inline(always)]
     pub fn holds(&self, at: [f32; 3]) -> bool {
         let mut holds = true;
-        for k in 0..3 {
-            let n = self.resolution[k] as i32 as f32;
+        for (at, n) in at.into_iter().zip(self.resolution) {
             // Written so that a NaN is outside.
-            holds &= (at[k] >= -0.25) & (at[k] <= n + 0.25);
+            holds &= (at >= -0.25) & (at <= n as i32 as f32 + 0.25);
         }
         holds
     }

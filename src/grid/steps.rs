@@ -42,7 +42,6 @@ pub(super) struct Level<V> {
 /// through the outermost grid, which the dilation has to spare; and its walls, whose times are rounded otherwise, rarely come before.
 const EARLIER: f32 = 1.0 / (1u64 << 20) as f32;
 
-/// Whole vectors: a line, and what it is in.
 impl<V: Lanes<4>> Level<V> {
     /// The walk through the outermost grid whose resolution is at word `first`, from `from` to the time `exit`.
     #[inline(always)]

@@ -32,43 +32,53 @@ pub(crate) fn walk<S: Simd, Q: Query>(
     query: &mut Q,
 ) -> bool {
     for head in cells.grids {
-        let part = slab.part(&head.bounds, query.t_bound());
-        if part.is_empty() {
-            continue;
-        }
-        let first = head.first_word as usize;
-        let Some(n) = cells.words.get(first).map(|word| resolution(*word)) else { continue };
-        if n == [1; 3] {
-            // What lists a few large primitives is seen faster than where the ray is in it.
-            query.watch().step();
-            let word = cells.words.get(first + 1).copied().unwrap_or(EMPTY);
-            if let Cell::Run(run) = cell(word) {
-                if visit(s, cells, run, EVER, ray, slab, query) {
-                    return true;
-                }
-                continue;
-            }
-        }
-        let cell_ray = CellRay::new(head, n, ray);
-        if !cell_ray.is_near(head.finest) {
-            return from_afar(cells, ray, query);
-        }
-        let mut part = [f64::from(part.near), f64::from(part.far)];
-        if !cell_ray.holds(cell_ray.at(part[0])) {
-            part = cell_ray.part(part);
-            // Written so that a NaN, from foreign bytes, ends it.
-            if !(part[0] <= part[1]) {
-                continue;
-            }
-        }
-        let [start, exit] = part;
-        let (from, exit) = (cell_ray.at(start), time_above(exit, start));
-        let level = Level::outermost(s, &cell_ray, head.first_word, from, exit);
-        if walk_one(s, cells, level, (start, cell_ray.turned), ray, slab, query) {
+        if walk_grid(s, cells, head, ray, slab, query) {
             return true;
         }
     }
     false
+}
+
+/// The same for one outermost grid.
+#[inline(always)]
+fn walk_grid<S: Simd, Q: Query>(
+    s: S,
+    cells: &Cells,
+    head: &GridHead,
+    ray: &PreparedRay,
+    slab: &impl Slab,
+    query: &mut Q,
+) -> bool {
+    let part = slab.part(&head.bounds, query.t_bound());
+    let first = head.first_word as usize;
+    let Some(n) = cells.words.get(first).map(|word| resolution(*word)) else { return false };
+    if part.is_empty() {
+        return false;
+    }
+    if n == [1; 3] {
+        // What lists a few large primitives is seen faster than where the ray is in it.
+        query.watch().step();
+        let word = cells.words.get(first + 1).copied().unwrap_or(EMPTY);
+        if let Cell::Run(run) = cell(word) {
+            return visit(s, cells, (run, EVER), ray, slab, query);
+        }
+    }
+    let cell_ray = CellRay::new(head, n, ray);
+    if !cell_ray.is_near(head.finest) {
+        return from_afar(cells, ray, query);
+    }
+    let mut part = [f64::from(part.near), f64::from(part.far)];
+    if !cell_ray.holds(cell_ray.at(part[0])) {
+        part = cell_ray.part(part);
+        // Written so that a NaN, from foreign bytes, ends it.
+        if !(part[0] <= part[1]) {
+            return false;
+        }
+    }
+    let [start, exit] = part;
+    let (from, exit) = (cell_ray.at(start), time_above(exit, start));
+    let level = Level::outermost(s, &cell_ray, head.first_word, from, exit);
+    follow(s, cells, level, (start, cell_ray.turned), ray, slab, query)
 }
 
 /// The time from `start` to `t`, rounded up if it is not negative. Finite, as walls that are never passed are beyond it.
@@ -76,6 +86,12 @@ pub(crate) fn walk<S: Simd, Q: Query>(
 pub(super) fn time_above(t: f64, start: f64) -> f32 {
     let time = ((t - start) * (1.0 + 1.0 / (1u64 << 22) as f64)) as f32;
     if time < f32::MAX { time } else { f32::MAX }
+}
+
+/// A bound as a time from `start`.
+#[inline(always)]
+fn bound_of<S: Simd>(s: S, t_bound: f32, start: f64) -> <S as Width<4>>::V {
+    Width::<4>::splat(s, time_above(f64::from(t_bound), start))
 }
 
 /// For a ray from so far away that not even `f64` tells its cells apart: every block is tested through its box.
@@ -87,7 +103,7 @@ fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool 
 
 /// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search. Times are counted from `start`.
 #[inline(always)]
-fn walk_one<S: Simd, Q: Query>(
+fn follow<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
     mut level: Level<<S as Width<4>>::V>,
@@ -101,9 +117,8 @@ fn walk_one<S: Simd, Q: Query>(
     // Where to go on behind inner grids.
     let mut outer = [None; MOST_DEPTH - 1];
     let mut depth = 0;
-    let bound_of = |t_bound: f32| Width::<4>::splat(s, time_above(f64::from(t_bound), start));
     let mut t_bound = query.t_bound();
-    let mut bound = bound_of(t_bound);
+    let mut bound = bound_of(s, t_bound, start);
     loop {
         query.watch().step();
         let word = cells.words.get(level.place as usize).copied().unwrap_or(EMPTY);
@@ -111,16 +126,6 @@ fn walk_one<S: Simd, Q: Query>(
             Cell::Empty => {
                 let side = side_ahead(word, octant);
                 if side > 0 { level.jump(s, SIDES[side], bound) } else { level.step(s, bound) }
-            }
-            Cell::Run(first) => {
-                if visit(s, cells, first, EVER, ray, slab, query) {
-                    return true;
-                }
-                if query.t_bound() < t_bound {
-                    t_bound = query.t_bound();
-                    bound = bound_of(t_bound);
-                }
-                level.step(s, bound)
             }
             Cell::Grid(first) => {
                 // A sound block has neither grids outside the words nor deeper ones.
@@ -135,16 +140,26 @@ fn walk_one<S: Simd, Q: Query>(
                 level = inner;
                 true
             }
-            Cell::Boxed(first) => {
-                let cell_box = cells.runs.get(first).map_or(CellBox::WHOLE, |run| run.cell_box());
-                if let Some(part) = level.part_in(s, cell_box, sides, bound) {
-                    let part = part.map(|t| (start + f64::from(t)) as f32);
-                    if visit(s, cells, first + 1, part, ray, slab, query) {
+            Cell::Run(_) | Cell::Boxed(_) => {
+                let listed = match cell(word) {
+                    Cell::Boxed(first) => match part_in(s, cells, &level, first, sides, bound) {
+                        Some([near, far]) => {
+                            let part =
+                                [(start + f64::from(near)) as f32, (start + f64::from(far)) as f32];
+                            Some((first + 1, part))
+                        }
+                        None => None,
+                    },
+                    Cell::Run(first) => Some((first, EVER)),
+                    _ => None,
+                };
+                if let Some(listed) = listed {
+                    if visit(s, cells, listed, ray, slab, query) {
                         return true;
                     }
                     if query.t_bound() < t_bound {
                         t_bound = query.t_bound();
-                        bound = bound_of(t_bound);
+                        bound = bound_of(s, t_bound, start);
                     }
                 }
                 level.step(s, bound)
@@ -162,6 +177,20 @@ fn walk_one<S: Simd, Q: Query>(
     }
 }
 
+/// The times between which the ray is in the box of a cell, which is entry `first`; `None` if it is not up to the bound.
+#[inline(always)]
+fn part_in<S: Simd>(
+    s: S,
+    cells: &Cells,
+    level: &Level<<S as Width<4>>::V>,
+    first: usize,
+    sides: Sides<<S as Width<4>>::V>,
+    bound: <S as Width<4>>::V,
+) -> Option<[f32; 2]> {
+    let cell_box = cells.runs.get(first).map_or(CellBox::WHOLE, |run| run.cell_box());
+    level.part_in(s, cell_box, sides, bound)
+}
+
 /// All of a ray.
 const EVER: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 
@@ -171,8 +200,7 @@ const EVER: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
 fn visit<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
-    first: usize,
-    [begin, end]: [f32; 2],
+    (first, [begin, end]): (usize, [f32; 2]),
     ray: &PreparedRay,
     slab: &impl Slab,
     query: &mut Q,
