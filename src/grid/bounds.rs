@@ -203,7 +203,7 @@ fn steps() {
         }
         // As early and as late as the box of the contents may say.
         let a_cell = 1.0 / cell_ray.direction.iter().fold(0.0, |most, speed| speed.max(most));
-        let (early, late) = (random.unit() * 0.2 * a_cell, random.unit() * 0.2 * a_cell);
+        let (early, late) = (random.unit() * 0.06 * a_cell, random.unit() * 0.06 * a_cell);
         let start = f64::from((enter - early).max(0.0) as f32);
         if !cell_ray.holds(cell_ray.at(start)) {
             continue;

@@ -73,13 +73,13 @@ impl CellRay {
         [(x + t * dx) as f32, (y + t * dy) as f32, (z + t * dz) as f32]
     }
 
-    /// Whether a point is in the grid, or at most a quarter of a cell outside.
+    /// Whether a point is in the grid, or at most a sixteenth of a cell outside.
     #[inline(always)]
     pub fn holds(&self, at: [f32; 3]) -> bool {
         let mut holds = true;
         for (at, n) in at.into_iter().zip(self.resolution) {
             // Written so that a NaN is outside.
-            holds &= (at >= -0.25) & (at <= n as i32 as f32 + 0.25);
+            holds &= (at >= -0.0625) & (at <= n as i32 as f32 + 0.0625);
         }
         holds
     }
