@@ -3,7 +3,7 @@
 //! ```text
 //! grids                the grids that hold everything, each over a box of its own
 //! words                grid after grid: its resolution, then a word for each cell, x fastest
-//! runs[first ..]       the lanes of leaf blocks in a cell, the last entry marked
+//! runs[first ..]       the lanes of leaf blocks in a cell, the last entry marked; before them, if the word says so, a box
 //! ```
 //!
 //! A cell's word has two bits of tag and thirty bits of meaning:
@@ -13,6 +13,7 @@
 //!     | 0  0 | the empty cubes ahead   |    nothing is in the cell
 //!     | 0  1 | first entry of its run  |
 //!     | 1  0 | first word of its grid  |    the cell is divided once more
+//!     | 1  1 | the box before its run  |    nothing in the cell is outside of that
 //! ```
 //!
 //! An empty cell says, for each octant of directions, how large a cube of empty cells it is the corner of: three
@@ -25,14 +26,15 @@
 #![allow(unsafe_code, reason = "promises about the layouts drawn here")]
 
 use super::leaf::LeafRef;
+use crate::math::Aabb;
 use crate::storage::Plain;
 
 /// Where a grid that is in no other lies: cell `(i, j, k)` spans the points `p` with `i <= (p - lower) * per_length <= i + 1`
 /// in x, and likewise in y and z.
 ///
 /// ```text
-/// byte 0       24           48       52           56         64
-///      | lower | per length | finest | first word | reserved |
+/// byte 0       24           48       52           56       80         128
+///      | lower | per length | finest | first word | bounds | reserved |
 /// ```
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -45,11 +47,13 @@ pub(crate) struct GridHead {
     pub finest: u32,
     /// The word of its resolution.
     pub first_word: u32,
-    pub reserved: [u32; 2],
+    /// The box of what is in it, which rays are held against first.
+    pub bounds: Aabb,
+    pub reserved: [u32; 12],
 }
-const _: () = assert!(size_of::<GridHead>() == 64);
+const _: () = assert!(size_of::<GridHead>() == 128);
 
-// SAFETY: numbers only; 24 + 24 + 4 + 4 + 8 = 64, so no padding.
+// SAFETY: numbers only; 24 + 24 + 4 + 4 + 24 + 48 = 128, so no padding.
 unsafe impl Plain for GridHead {}
 
 /// One entry of a cell's run.
@@ -72,10 +76,55 @@ const _: () = assert!(size_of::<Run>() == 8);
 // SAFETY: two numbers of equal size.
 unsafe impl Plain for Run {}
 
+/// What of a cell its contents take up: an entry before those of its run.
+///
+/// ```text
+/// byte 0               4               8
+///      | lower x y z 0 | upper x y z 0 |
+/// ```
+///
+/// A byte counts steps of [`STEP`](Self::STEP) from [`BEGIN`](Self::BEGIN), both in cells: an eighth on either side is what errors of
+/// the walk and of the box have to themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct CellBox {
+    pub lower: [u8; 4],
+    pub upper: [u8; 4],
+}
+
+impl CellBox {
+    pub const STEP: f32 = 5.0 / 1024.0;
+    pub const BEGIN: f32 = -1.0 / 8.0;
+    /// All that is in the cell.
+    pub const WHOLE: Self = CellBox { lower: [0; 4], upper: [255, 255, 255, 0] };
+
+    /// The box between corners in cells, from the cell's own corner, rounded outwards.
+    pub fn around(lower: [f64; 3], upper: [f64; 3]) -> Self {
+        let mut around = Self::WHOLE;
+        for k in 0..3 {
+            // The casts saturate.
+            let steps = |x: f64| (x - f64::from(Self::BEGIN)) / f64::from(Self::STEP);
+            around.lower[k] = steps(lower[k]) as u8;
+            around.upper[k] = (steps(upper[k]) + 1.0) as u8;
+        }
+        around
+    }
+
+    /// As two numbers, the higher bits of the second clear.
+    pub fn words(self) -> [u32; 2] {
+        [self.lower, self.upper].map(u32::from_le_bytes)
+    }
+
+    pub fn from_words(words: [u32; 2]) -> Self {
+        let [lower, upper] = words.map(u32::to_le_bytes);
+        CellBox { lower, upper }
+    }
+}
+
 /// Marks the last entry of a run.
 pub(crate) const LAST: u32 = 1 << 31;
 const TAG_RUN: u32 = 1 << 30;
 const TAG_GRID: u32 = 2 << 30;
+const TAG_BOX: u32 = 3 << 30;
 /// The highest entry at which a run can start, and the highest word at which a grid can.
 pub(crate) const VALUE: u32 = TAG_RUN - 1;
 
@@ -99,8 +148,8 @@ pub(crate) enum Cell {
     Run(usize),
     /// The word of its grid's resolution.
     Grid(usize),
-    /// Nothing that a build writes.
-    Unknown,
+    /// The entry of its [`CellBox`], which its run follows.
+    Boxed(usize),
 }
 
 /// The meaning of a cell's word.
@@ -111,13 +160,18 @@ pub(crate) fn cell(word: u32) -> Cell {
         0 => Cell::Empty,
         TAG_RUN => Cell::Run(value),
         TAG_GRID => Cell::Grid(value),
-        _ => Cell::Unknown,
+        _ => Cell::Boxed(value),
     }
 }
 
 /// The word of a cell whose run starts at entry `first`.
 pub(crate) fn run_word(first: u32) -> u32 {
     TAG_RUN | first
+}
+
+/// The word of a cell whose box is entry `first`.
+pub(crate) fn box_word(first: u32) -> u32 {
+    TAG_BOX | first
 }
 
 /// The word of a cell whose grid starts at word `first`.
@@ -159,6 +213,17 @@ impl Run {
         LeafRef { block: self.block, lanes: self.lanes & 0xFFFF }
     }
 
+    /// The entry that is a box.
+    pub fn of_box(cell_box: CellBox) -> Self {
+        let [block, lanes] = cell_box.words();
+        Run { block, lanes }
+    }
+
+    #[inline(always)]
+    pub fn cell_box(self) -> CellBox {
+        CellBox::from_words([self.block, self.lanes])
+    }
+
     #[inline(always)]
     pub fn is_last(self) -> bool {
         self.lanes & LAST != 0
@@ -174,10 +239,26 @@ mod tests {
         assert_eq!(cell(EMPTY), Cell::Empty);
         assert_eq!(cell(run_word(VALUE)), Cell::Run(VALUE as usize));
         assert_eq!(cell(grid_word(7)), Cell::Grid(7));
-        assert_eq!(cell(u32::MAX), Cell::Unknown);
+        assert_eq!(cell(box_word(9)), Cell::Boxed(9));
         assert_eq!(resolution(resolution_word([1023, 1, 512])), [1023, 1, 512]);
         let word = 5 << 21 | 3;
         assert_eq!([0, 1, 7].map(|octant| side_ahead(word, octant)), [3, 0, 5]);
         assert_eq!(cell(word), Cell::Empty);
+    }
+
+    #[test]
+    fn boxes_of_cells_are_rounded_outwards() {
+        for [lower, upper] in [[0.3, 0.4], [0.0, 1.0], [0.5, 0.5], [-0.12, 1.1]] {
+            let cell_box = CellBox::around([lower; 3], [upper; 3]);
+            let at = |q: u8| CellBox::BEGIN + f32::from(q) * CellBox::STEP;
+            let [near, far] =
+                [cell_box.lower, cell_box.upper].map(|corner| f64::from(at(corner[0])));
+            assert!(near <= lower && lower < near + 0.006, "{lower} {near}");
+            assert!(upper <= far && far < upper + 0.006, "{upper} {far}");
+            assert_eq!(Run::of_box(cell_box).cell_box(), cell_box);
+            assert!(!Run::of_box(cell_box).is_last());
+        }
+        let beyond = CellBox::around([-9.0; 3], [f64::INFINITY; 3]);
+        assert_eq!(beyond, CellBox::WHOLE);
     }
 }

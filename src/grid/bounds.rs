@@ -10,7 +10,8 @@ use raykern_harness::search::{Worst, samples};
 use super::overlap::cells_near;
 use super::ray::CellRay;
 use super::space::Space;
-use super::steps::{Level, Part};
+use super::steps::Level;
+use super::walk::time_above;
 use super::{FINEST, dilation};
 use crate::math::{Aabb, wide};
 use crate::prim::Shape;
@@ -122,29 +123,35 @@ impl RealRay {
 struct Walker<'r> {
     random: &'r mut Random,
     cell_ray: CellRay,
+    /// Where its times count from, and those between which the ray is in the outermost grid.
+    start: f64,
+    inside: [f64; 2],
     t_scale: f64,
     resolutions: Vec<[u32; 3]>,
 }
 
 impl Walker<'_> {
-    /// Walks through a grid and some of those in its cells; whether a bound was broken.
+    /// Walks through a grid and some of those in its cells, until the walk around it goes on; whether a bound was broken.
     fn walk(
         &mut self,
         depth: usize,
-        mut level: Level<[f32; 4]>,
+        (mut level, until): (Level<[f32; 4]>, f32),
         real: &RealRay,
         worst: &mut Worst,
     ) -> bool {
+        const NO_BOUND: [f32; 4] = [f32::INFINITY; 4];
         let mut broken = false;
         for _ in 0..24 {
-            let seen = level.seen(Scalar);
+            let seen = level.seen(Scalar, until);
             let cell = seen.cell;
-            for k in 0..3 {
+            let [begin, end] = seen.times.map(f64::from);
+            let times = [begin.max(self.inside[0]), end.min(self.inside[1])];
+            for k in (0..3).filter(|_| times[0] <= times[1]) {
                 let along = self.resolutions[..=depth].iter().map(|n| f64::from(n[k])).product();
-                for t in seen.times {
+                for t in times {
                     // Both the start and what is counted from it are exact.
-                    let t = &Dyadic::from_f64(t[0] / self.t_scale)
-                        + &Dyadic::from_f64(t[1] / self.t_scale);
+                    let t = &Dyadic::from_f64(self.start / self.t_scale)
+                        + &Dyadic::from_f64(t / self.t_scale);
                     broken |= worst.see(real.outside(k, &t, cell[k]), dilation(along));
                 }
             }
@@ -155,13 +162,18 @@ impl Walker<'_> {
             if let Some(inner) =
                 self.resolutions.get(depth + 1).copied().filter(|_| self.random.below(3) == 0)
             {
-                let deeper = level.inner(Scalar, (0, inner), self.cell_ray.turned, f32::INFINITY);
+                let deeper = level.inner(Scalar, (0, inner), self.cell_ray.turned);
+                let deeper = (deeper, seen.times[1]);
                 if self.walk(depth + 1, deeper, &real.within(cell, inner), worst) {
                     return true;
                 }
             }
             let side = [1, 1, 2, 5][self.random.below(4)];
-            if !(if side == 1 { level.step(Scalar) } else { level.jump(Scalar, side) }) {
+            if !(if side == 1 {
+                level.step(Scalar, NO_BOUND)
+            } else {
+                level.jump(Scalar, side, NO_BOUND)
+            }) {
                 break;
             }
         }
@@ -185,16 +197,26 @@ fn steps() {
         let parts = resolutions[1..].iter().fold([1; 3], |all, n| [0, 1, 2].map(|k| all[k] * n[k]));
         let finest = parts.into_iter().max().unwrap_or(1);
         let cell_ray = CellRay::new(&space.head(0, finest), space.resolution, &ray);
-        let [enter, exit] = cell_ray.times();
-        if !cell_ray.is_near(finest) || enter.max(0.0) > exit {
+        let [enter, exit] = cell_ray.part([0.0, f64::INFINITY]);
+        if !cell_ray.is_near(finest) || enter > exit {
             continue;
         }
-        let part = Part { start: enter.max(0.0), exit };
-        let level = Level::outermost(Scalar, &cell_ray, 0, part, f32::INFINITY);
+        // As early and as late as the box of the contents may say.
+        let a_cell = 1.0 / cell_ray.direction.iter().fold(0.0, |most, speed| speed.max(most));
+        let (early, late) = (random.unit() * 0.06 * a_cell, random.unit() * 0.06 * a_cell);
+        let start = f64::from((enter - early).max(0.0) as f32);
+        if !cell_ray.holds(cell_ray.at(start)) {
+            continue;
+        }
+        let inside = [(enter - start).max(0.0), exit - start];
+        let exit = exit + late;
+        let until = time_above(exit, start);
+        let level = Level::outermost(Scalar, &cell_ray, 0, cell_ray.at(start), until);
         let real = RealRay::new(&space, &ray, &cell_ray);
+        let t_scale = ray.t_scale;
         let mut walker =
-            Walker { random: &mut random, cell_ray, t_scale: ray.t_scale, resolutions };
-        let broken = walker.walk(0, level, &real, &mut worst);
+            Walker { random: &mut random, cell_ray, start, inside, t_scale, resolutions };
+        let broken = walker.walk(0, (level, until), &real, &mut worst);
         assert!(!broken, "sample {sample} of seed {SEED}: {before:?}");
     }
     worst.assert_tight(0.02);

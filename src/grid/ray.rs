@@ -66,12 +66,31 @@ impl CellRay {
         near
     }
 
-    /// The `t` at which the ray enters the grid and leaves it; the first above the second if it misses.
+    /// Where the ray is at `t`.
+    #[inline(always)]
+    pub fn at(&self, t: f64) -> [f32; 3] {
+        let ([x, y, z], [dx, dy, dz]) = (self.origin, self.direction);
+        [(x + t * dx) as f32, (y + t * dy) as f32, (z + t * dz) as f32]
+    }
+
+    /// Whether a point is in the grid, or at most a sixteenth of a cell outside.
+    #[inline(always)]
+    pub fn holds(&self, at: [f32; 3]) -> bool {
+        let mut holds = true;
+        for (at, n) in at.into_iter().zip(self.resolution) {
+            // Written so that a NaN is outside.
+            holds &= (at >= -0.0625) & (at <= n as i32 as f32 + 0.0625);
+        }
+        holds
+    }
+
+    /// What of a part of the ray is between the walls, the first `t` above the second if nothing is: for rays from so far away that `f32`
+    /// does not tell where they come into the box.
     ///
     /// Off by less than what the walls are away from the contents.
-    #[inline(always)]
-    pub fn times(&self) -> [f64; 2] {
-        let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    #[cold]
+    #[inline(never)]
+    pub fn part(&self, [mut enter, mut leave]: [f64; 2]) -> [f64; 2] {
         for k in 0..3 {
             let inverse = 1.0 / self.direction[k];
             let near = -self.origin[k] * inverse;

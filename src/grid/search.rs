@@ -63,7 +63,8 @@ fn search_one(cells: &Cells, outermost: Level, point: [f64; 3], nearest: &mut im
                     depth += 1;
                 }
             }
-            Cell::Empty | Cell::Unknown => {}
+            Cell::Boxed(first) => visit(cells, first + 1, nearest),
+            Cell::Empty => {}
         }
     }
 }

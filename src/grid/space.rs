@@ -21,6 +21,8 @@ const MARGIN: f64 = 1.0 / 512.0;
 /// rounding takes does not add up from grid to grid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Space {
+    /// The box that the outermost grid is over.
+    bounds: Aabb,
     lower: [f64; 3],
     per_length: [f64; 3],
     /// The cells of the outermost grid.
@@ -101,6 +103,7 @@ impl Space {
         let proportions = proportions(bounds);
         let widest = extent.max_element();
         let mut space = Space {
+            bounds: *bounds,
             lower: [0.0; 3],
             per_length: [0.0; 3],
             outermost: [1.0; 3],
@@ -155,8 +158,8 @@ impl Space {
 
     /// What a block keeps of it, if it is an outermost grid.
     pub fn head(&self, first_word: u32, finest: u32) -> GridHead {
-        let Space { lower, per_length, .. } = *self;
-        GridHead { lower, per_length, finest, first_word, reserved: [0; 2] }
+        let Space { lower, per_length, bounds, .. } = *self;
+        GridHead { lower, per_length, finest, first_word, bounds, reserved: [0; 12] }
     }
 
     /// A point in cells.

@@ -1,41 +1,35 @@
 //! Steps from cell to cell of one grid.
 
 use super::ray::CellRay;
+use crate::block::cells::CellBox;
 use crate::simd::{Lanes, Simd, Width};
 
 /// Where the walk is in one grid: the lanes are the axes, and the fourth means nothing.
 ///
-/// The ray is given anew for each grid, in its cells, turned so that no coordinate falls, and as `from + (t - start) *
-/// speed` from where it enters: so `f32` tells cells apart however far away the ray comes from. The `t` of a wall comes
+/// The ray is given in the cells of the grid, turned so that no coordinate falls, as `from + t * speed`, with `t` counted from where it
+/// comes into the outermost one: so `f32` tells cells apart however far away the ray comes from. The `t` of a wall comes
 /// from its number, `(wall - from) / speed`, and never from adding up steps, so errors do not grow along the ray. At each
 /// real `t` the walk is in the cell whose walls have been passed by their computed `t`; at the last cell of an
 /// axis it stays, until `exit`.
 ///
-/// With `n` cells along an axis and `u` the unit of `f32`, the coordinate at which a wall is passed is off by at most `5 u n`:
-/// `from`, the difference, the component, its reciprocal, the product. So is the coordinate after a jump: component,
-/// product, `from`, sum. `docs/METHODS.md` follows that through grids within grids.
+/// With `n` cells along an axis of an outermost grid and `u` the unit of `f32`, the coordinate at which a wall is passed is off by at
+/// most `5 u n`: `from`, the difference, the component, its reciprocal, the product. So is the coordinate after a jump: component,
+/// product, `from`, sum. `docs/METHODS.md` follows that into grids within grids.
 ///
 /// Source: \[AW87\], in the form that takes `t` from the index.
 #[derive(Clone, Copy)]
 pub(super) struct Level<V> {
-    /// The ray in cells of this grid, as in [`CellRay`].
-    origin: [f64; 3],
-    direction: [f64; 3],
-    /// The `t` at which this begins and ends; `t` below is counted from the first.
-    start: f64,
-    exit: f64,
     from: V,
     speed: V,
     /// The reciprocal of `speed`.
     pace: V,
-    /// The wall ahead: cell number plus one.
+    /// The wall ahead: cell number plus one, or infinity once the walk is in the last cell to stay.
     wall: V,
     /// The wall behind the last cell.
     last: V,
-    /// When the walk came into its cell.
+    /// When the walk came into its cell, and when it leaves the grid.
     entered: V,
-    /// Nothing beyond is of interest: the exit, or the bound if that is nearer.
-    limit: V,
+    exit: V,
     /// The word of the cell.
     pub place: u32,
     /// The word of the cell with the lowest turned coordinates.
@@ -44,81 +38,28 @@ pub(super) struct Level<V> {
     strides: [u32; 3],
 }
 
-/// A part of a ray, by its ends.
-#[derive(Clone, Copy)]
-pub(super) struct Part {
-    pub start: f64,
-    pub exit: f64,
-}
-
-/// The time from `start` to `t`, rounded up if it is not negative.
-#[inline(always)]
-fn time_above(t: f64, start: f64) -> f32 {
-    ((t - start) * (1.0 + 1.0 / (1u64 << 22) as f64)) as f32
-}
-
-/// Stays in range: a cell's walls are passed at no finite time.
-const STOPPED: f32 = f32::NEG_INFINITY;
+/// An inner grid is left earlier than the cell that it is in by this part of `t`. In that time the ray moves by this part of the way
+/// through the outermost grid, which the dilation has to spare; and its walls, whose times are rounded otherwise, rarely come before.
+const EARLIER: f32 = 1.0 / (1u64 << 20) as f32;
 
 impl<V: Lanes<4>> Level<V> {
-    /// The walk through the outermost grid whose resolution is at word `first`.
+    /// The walk through the outermost grid whose resolution is at word `first`, from `from` to the time `exit`.
     #[inline(always)]
     pub fn outermost<S: Simd + Width<4, V = V>>(
         s: S,
         ray: &CellRay,
         first: u32,
-        part: Part,
-        t_bound: f32,
+        from: [f32; 3],
+        exit: f32,
     ) -> Self {
-        let grid = (first, ray.resolution);
-        Level::new(s, [ray.origin, ray.direction], grid, ray.turned, part, t_bound)
-    }
-
-    #[inline(always)]
-    fn new<S: Simd + Width<4, V = V>>(
-        s: S,
-        [origin, direction]: [[f64; 3]; 2],
-        (first, resolution): (u32, [u32; 3]),
-        turned: [u32; 3],
-        Part { start, exit }: Part,
-        t_bound: f32,
-    ) -> Self {
-        let (mut from, mut speed) = ([STOPPED; 4], [1.0; 4]);
-        let (mut strides, mut corner) = ([0; 3], first.wrapping_add(1));
-        let mut stride = 1u32;
-        for k in 0..3 {
-            from[k] = (origin[k] + start * direction[k]) as f32;
-            speed[k] = direction[k] as f32;
-            let n = resolution[k];
-            strides[k] = (stride ^ turned[k]).wrapping_sub(turned[k]);
-            corner = corner.wrapping_add(n.wrapping_sub(1).wrapping_mul(stride) & turned[k]);
-            stride = stride.wrapping_mul(n);
-        }
-        let [x, y, z] = resolution.map(|n| n as i32);
-        let one = Width::<4>::splat(s, 1.0);
-        let (from, last) = (Width::<4>::load(s, &from), s.floats([x, y, z, 1]));
-        let speed = Width::<4>::load(s, &speed);
-        // The cell where it is now, or the nearest.
-        let cell = s.whole(from.max(Width::<4>::splat(s, 0.0)).min(last.sub(one)));
-        let mut level = Level {
-            origin,
-            direction,
-            start,
-            exit,
-            from,
-            speed,
-            pace: one.div(speed),
-            wall: s.floats(cell).add(one),
-            last,
-            entered: Width::<4>::splat(s, 0.0),
-            limit: Width::<4>::splat(s, 0.0),
-            place: 0,
-            corner,
-            strides,
-        };
-        level.place = level.word_of(cell);
-        level.look_up_to(s, t_bound);
-        level
+        let [x, y, z] = from;
+        let from = Width::<4>::load(s, &[x, y, z, 0.0]);
+        let [x, y, z] = [ray.direction[0] as f32, ray.direction[1] as f32, ray.direction[2] as f32];
+        let speed = Width::<4>::load(s, &[x, y, z, 1.0]);
+        let pace = Width::<4>::splat(s, 1.0).div(speed);
+        let times = [Width::<4>::splat(s, 0.0), Width::<4>::splat(s, exit)];
+        let last = whole_floats(s, ray.resolution);
+        Level::new(s, [from, speed, pace, last], (first, ray.resolution), ray.turned, times)
     }
 
     /// The walk through the grid in the cell, whose resolution is at word `first`.
@@ -128,24 +69,47 @@ impl<V: Lanes<4>> Level<V> {
         s: S,
         (first, resolution): (u32, [u32; 3]),
         turned: [u32; 3],
-        t_bound: f32,
     ) -> Self {
-        let (mut wall, mut entered, mut leaves) = ([0.0; 4], [0.0; 4], [0.0; 4]);
-        self.wall.store(&mut wall);
-        self.entered.store(&mut entered);
-        s.least_of_three(self.wall.sub(self.from).mul(self.pace)).store(&mut leaves);
-        let (mut origin, mut direction) = ([0.0; 3], [0.0; 3]);
+        let n = whole_floats(s, resolution);
+        let cell = self.wall.min(self.last).sub(Width::<4>::splat(s, 1.0));
+        let from = self.from.sub(cell).mul(n);
+        let line = [from, self.speed.mul(n), self.pace.div(n), n];
+        let leaves = s.least_of_three(self.times()).mul(Width::<4>::splat(s, 1.0 - EARLIER));
+        let times = [self.entered, leaves.min(self.exit)];
+        Level::new(s, line, (first, resolution), turned, times)
+    }
+
+    #[inline(always)]
+    fn new<S: Simd + Width<4, V = V>>(
+        s: S,
+        [from, speed, pace, last]: [V; 4],
+        (first, resolution): (u32, [u32; 3]),
+        turned: [u32; 3],
+        [entered, exit]: [V; 2],
+    ) -> Self {
+        let one = Width::<4>::splat(s, 1.0);
+        let (mut strides, mut corner) = ([0; 3], first.wrapping_add(1));
+        let mut stride = 1u32;
         for k in 0..3 {
-            let n = f64::from(resolution[k]);
-            origin[k] = (self.origin[k] - f64::from(wall[k] - 1.0)) * n;
-            direction[k] = self.direction[k] * n;
+            let n = resolution[k];
+            strides[k] = (stride ^ turned[k]).wrapping_sub(turned[k]);
+            corner = corner.wrapping_add(n.wrapping_sub(1).wrapping_mul(stride) & turned[k]);
+            stride = stride.wrapping_mul(n);
         }
-        let exit = self.start + f64::from(leaves[0]);
-        let part = Part {
-            start: self.start + f64::from(entered[0]),
-            exit: if exit < self.exit { exit } else { self.exit },
-        };
-        Level::new(s, [origin, direction], (first, resolution), turned, part, t_bound)
+        // The cell where it is when it enters, or the nearest.
+        let at = speed.mul(entered).add(from).max(Width::<4>::splat(s, 0.0));
+        let cell = s.whole(at.min(last.sub(one)));
+        let wall = s.floats(cell).add(one);
+        let mut level =
+            Level { from, speed, pace, wall, last, entered, exit, place: 0, corner, strides };
+        level.place = level.word_of(cell);
+        level
+    }
+
+    /// The times at which the walls ahead are passed.
+    #[inline(always)]
+    fn times(&self) -> V {
+        self.wall.sub(self.from).mul(self.pace)
     }
 
     /// The word of a cell.
@@ -158,40 +122,59 @@ impl<V: Lanes<4>> Level<V> {
         word
     }
 
-    /// Takes note of a new bound.
+    /// The times between which the ray is in a box in the cell; `None` if it is not up to the bound.
     #[inline(always)]
-    pub fn look_up_to<S: Simd + Width<4, V = V>>(&mut self, s: S, t_bound: f32) {
-        let t = f64::from(t_bound);
-        let end = if t < self.exit { t } else { self.exit };
-        self.limit = Width::<4>::splat(s, time_above(end, self.start));
+    pub fn part_in<S: Simd + Width<4, V = V>>(
+        &self,
+        s: S,
+        cell_box: CellBox,
+        sides: Sides<V>,
+        bound: V,
+    ) -> Option<[f32; 2]> {
+        let [lower, upper] = [cell_box.lower, cell_box.upper].map(|corner| corner.map(i32::from));
+        let (lower, upper) = (s.floats(lower), s.floats(upper));
+        let half = upper.sub(lower).mul(Width::<4>::splat(s, CellBox::STEP / 2.0)).mul(self.pace);
+        let cell = self.wall.min(self.last).sub(Width::<4>::splat(s, 1.0));
+        let middle = lower.add(upper).mul(sides.half_step).add(sides.begin).add(cell);
+        let middle = middle.sub(self.from).mul(self.pace);
+        let near = s.largest_of_three(middle.sub(half));
+        let far = s.least_of_three(middle.add(half));
+        if near.less_or_equal(far.min(bound)) & 1 == 0 {
+            return None;
+        }
+        let [mut begin, mut end] = [[0.0; 4]; 2];
+        near.store(&mut begin);
+        far.store(&mut end);
+        Some([begin[0], end[0]])
     }
 
-    /// Whether the bound comes before the exit: then what is behind this grid is not of interest.
+    /// Whether the walk came into its cell before the bound.
     #[inline(always)]
-    pub fn ends_before_exit(&self, t_bound: f32) -> bool {
-        f64::from(t_bound) < self.exit
+    pub fn begins_before(&self, bound: V) -> bool {
+        self.entered.less_or_equal(bound) & 1 == 1
     }
 
-    /// Goes through the nearest wall, or all that are equally near; false when that is beyond the limit.
+    /// Goes through the nearest wall, or all that are equally near; false when that is beyond the exit or the bound.
     #[inline(always)]
-    pub fn step<S: Simd + Width<4, V = V>>(&mut self, s: S) -> bool {
+    pub fn step<S: Simd + Width<4, V = V>>(&mut self, s: S, bound: V) -> bool {
         let one = Width::<4>::splat(s, 1.0);
+        let limit = self.exit.min(bound);
         loop {
-            let times = self.wall.sub(self.from).mul(self.pace);
+            let times = self.times();
             let least = s.least_of_three(times);
             // Written so that a NaN ends the walk.
-            if least.less_or_equal(self.limit) & 1 == 0 {
+            if least.less_or_equal(limit) & 1 == 0 {
                 return false;
             }
             let moved = times.less_or_equal(least) & 7;
             self.wall = self.wall.add(s.where_less_or_equal(times, least, one));
             self.entered = least;
-            self.place = self.place.wrapping_add(self.along(moved));
-            let outside = self.last.less(self.wall) & 7;
+            let outside = self.last.less(self.wall) & moved;
+            self.place = self.place.wrapping_add(self.along(moved & !outside));
             if outside == 0 {
                 return true;
             }
-            self.stop(s, outside);
+            self.stay_inside(s);
             if outside != moved {
                 return true;
             }
@@ -208,65 +191,76 @@ impl<V: Lanes<4>> Level<V> {
         sum
     }
 
-    /// Stays in the last cell of these axes, whose last wall was just passed.
+    /// Stays in the last cell of each axis whose last wall was passed: the next one is never.
     #[inline(always)]
-    fn stop<S: Simd + Width<4, V = V>>(&mut self, s: S, axes: u32) {
-        self.place = self.place.wrapping_sub(self.along(axes));
-        self.wall = self.wall.min(self.last);
-        let mut from = [0.0; 4];
-        self.from.store(&mut from);
-        for (k, from) in from.iter_mut().enumerate() {
-            if axes >> k & 1 == 1 {
-                *from = STOPPED;
-            }
-        }
-        self.from = Width::<4>::load(s, &from);
+    fn stay_inside<S: Simd + Width<4, V = V>>(&mut self, s: S) {
+        let beyond = self.last.add(Width::<4>::splat(s, 1.0));
+        let never = Width::<4>::splat(s, f32::INFINITY);
+        self.wall = self.wall.add(s.where_less_or_equal(beyond, self.wall, never));
     }
 
-    /// Goes through the cube of `side` empty cells ahead, the cell itself included; false when it ends beyond the limit.
+    /// Goes through the cube of `side` empty cells ahead, the cell itself included; false when it ends beyond the exit or the bound.
     #[inline(always)]
-    pub fn jump<S: Simd + Width<4, V = V>>(&mut self, s: S, side: u8) -> bool {
+    pub fn jump<S: Simd + Width<4, V = V>>(&mut self, s: S, side: u8, bound: V) -> bool {
         let one = Width::<4>::splat(s, 1.0);
         let far = self.wall.add(Width::<4>::splat(s, f32::from(side - 1)));
         let times = far.sub(self.from).mul(self.pace);
         let least = s.least_of_three(times);
-        if least.less_or_equal(self.limit) & 1 == 0 {
+        if least.less_or_equal(self.exit.min(bound)) & 1 == 0 {
             return false;
         }
         // On other axes to where the ray is then: forwards, and within the cube.
-        let at = self.speed.mul(least).add(self.from).max(self.wall.sub(one)).min(far);
-        let along = s.floats(s.whole(at)).add(one).min(far);
-        let through = s.where_less_or_equal(times, least, one);
-        // Those that leave the cube are at its far wall already.
+        let at = self.speed.mul(least).add(self.from);
+        let along = s.floats(s.whole(at)).add(one).min(far).max(self.wall);
+        // Those that leave the cube are at its far wall already, and go through it.
         let along = s.where_less_or_equal(times, least, far).max(along);
-        self.wall = along.add(through);
+        self.wall = along.add(s.where_less_or_equal(times, least, one));
         self.entered = least;
-        if self.last.less(self.wall) & 7 != 0 {
-            self.stop_beyond(s);
-        }
-        self.place = self.word_of(s.whole(self.wall.sub(one)));
+        self.stay_inside(s);
+        self.place = self.word_of(s.whole(self.wall.min(self.last).sub(one)));
         true
     }
 
-    /// Stays in the last cells of the axes along which the walk is beyond them.
-    #[inline(always)]
-    fn stop_beyond<S: Simd + Width<4, V = V>>(&mut self, s: S) {
-        let outside = self.last.less(self.wall) & 7;
-        self.stop(s, outside);
-    }
-
-    /// The cell, and when the walk came into it and will leave it, as a start and a time from there.
+    /// The cell, and when the walk came into it and will leave it: the times count from the start of the outermost grid, and the
+    /// second is `until` if it leaves the grid then.
     #[cfg(test)]
-    pub fn seen<S: Simd + Width<4, V = V>>(&self, s: S) -> Seen {
-        let [mut wall, mut entered, mut leaves, mut limit] = [[0.0; 4]; 4];
-        self.wall.store(&mut wall);
+    pub fn seen<S: Simd + Width<4, V = V>>(&self, s: S, until: f32) -> Seen {
+        let [mut wall, mut entered, mut leaves, mut exit] = [[0.0; 4]; 4];
+        self.wall.min(self.last).store(&mut wall);
         self.entered.store(&mut entered);
-        self.limit.store(&mut limit);
-        s.least_of_three(self.wall.sub(self.from).mul(self.pace)).store(&mut leaves);
-        let end = leaves[0].min(limit[0]).max(entered[0]);
+        self.exit.store(&mut exit);
+        s.least_of_three(self.times()).store(&mut leaves);
+        let end = if leaves[0] <= exit[0] { leaves[0] } else { until };
         let cell = [0, 1, 2].map(|k| wall[k] - 1.0);
-        Seen { cell, times: [entered[0], end].map(|t| [self.start, f64::from(t)]) }
+        Seen { cell, times: [entered[0], end.max(entered[0])] }
     }
+}
+
+/// How boxes in cells are turned with the ray.
+#[derive(Clone, Copy)]
+pub(super) struct Sides<V> {
+    /// Half a step of a box, below zero along a turned axis, and where these steps begin.
+    half_step: V,
+    begin: V,
+}
+
+impl<V: Lanes<4>> Sides<V> {
+    #[inline(always)]
+    pub fn new<S: Simd + Width<4, V = V>>(s: S, turned: [u32; 3]) -> Self {
+        let (mut half_step, mut begin) = ([0.0; 4], [0.0; 4]);
+        for k in 0..3 {
+            let falls = turned[k] != 0;
+            half_step[k] = if falls { -CellBox::STEP / 2.0 } else { CellBox::STEP / 2.0 };
+            begin[k] = if falls { 1.0 - CellBox::BEGIN } else { CellBox::BEGIN };
+        }
+        Sides { half_step: Width::<4>::load(s, &half_step), begin: Width::<4>::load(s, &begin) }
+    }
+}
+
+/// Numbers of cells.
+#[inline(always)]
+fn whole_floats<S: Simd>(s: S, [x, y, z]: [u32; 3]) -> <S as Width<4>>::V {
+    s.floats([x as i32, y as i32, z as i32, 1])
 }
 
 /// What a walk thinks.
@@ -274,5 +268,5 @@ impl<V: Lanes<4>> Level<V> {
 #[derive(Debug)]
 pub(super) struct Seen {
     pub cell: [f32; 3],
-    pub times: [[f64; 2]; 2],
+    pub times: [f32; 2],
 }

@@ -20,32 +20,23 @@ pub(crate) fn grids_are_sound(
     let shaped = |head: &GridHead| {
         finite(&head.lower) && finite(&head.per_length) && head.per_length.iter().all(|n| *n > 0.0)
     };
-    !grids.is_empty()
-        && grids.iter().all(shaped)
-        && {
-            let mut checker = Checker { words, runs, next_word: 0, next_run: 0 };
-            let outermost = grids.iter().all(|head| checker.grid_at(head.first_word as usize));
-            outermost && checker.all_words() && checker.next_run == runs.len()
-        }
-        && entries_exist(runs, leaves)
-}
-
-fn entries_exist(runs: &[Run], leaves: &Leaves) -> bool {
-    runs.iter().all(|run| {
-        let leaf = LeafRef { block: run.block, lanes: run.lanes & !LAST };
-        leaf.lanes <= 0xFFFF && leaves.has(leaf)
-    })
+    !grids.is_empty() && grids.iter().all(shaped) && {
+        let mut checker = Checker { words, runs, leaves, next_word: 0, next_run: 0 };
+        let outermost = grids.iter().all(|head| checker.grid_at(head.first_word as usize));
+        outermost && checker.all_words() && checker.next_run == runs.len()
+    }
 }
 
 /// How far words and runs have been named.
-struct Checker<'m> {
+struct Checker<'m, 'l> {
     words: &'m [u32],
     runs: &'m [Run],
+    leaves: &'m Leaves<'l>,
     next_word: usize,
     next_run: usize,
 }
 
-impl Checker<'_> {
+impl Checker<'_, '_> {
     /// Whether the next grid starts at this word, and is there; goes on to the one after it.
     fn grid_at(&mut self, first: usize) -> bool {
         if first != self.next_word {
@@ -88,25 +79,34 @@ impl Checker<'_> {
         match self.words.get(place).map(|word| cell(*word)) {
             Some(Cell::Empty) => true,
             Some(Cell::Run(first)) => first == self.next_run && self.skip_run(),
+            Some(Cell::Boxed(first)) => {
+                // Any bytes are a box.
+                self.next_run += 1;
+                first + 1 == self.next_run && self.skip_run()
+            }
             Some(Cell::Grid(first)) => self.grid_at(first),
-            Some(Cell::Unknown) | None => false,
+            None => false,
         }
     }
 
-    /// Goes to the end of the next run.
+    /// Goes to the end of the next run, the entries of which must exist.
     fn skip_run(&mut self) -> bool {
         let rest = self.runs.get(self.next_run..).unwrap_or(&[]);
         let Some(length) = rest.iter().position(|run| run.is_last()) else { return false };
         self.next_run += length + 1;
-        true
+        rest[..=length].iter().all(|run| {
+            let leaf = LeafRef { block: run.block, lanes: run.lanes & !LAST };
+            leaf.lanes <= 0xFFFF && self.leaves.has(leaf)
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::block::cells::{EMPTY, grid_word, resolution_word, run_word};
+    use crate::block::cells::{CellBox, EMPTY, box_word, grid_word, resolution_word, run_word};
     use crate::block::leaf::TriangleBlock;
+    use crate::math::Aabb;
     use std::vec::Vec;
 
     const HEAD: GridHead = GridHead {
@@ -114,7 +114,8 @@ mod tests {
         per_length: [1.0; 3],
         finest: 1,
         first_word: 0,
-        reserved: [0; 2],
+        bounds: Aabb { lower: [0.0; 3], upper: [1.0; 3] },
+        reserved: [0; 12],
     };
 
     fn entry(lanes: u32) -> Run {
@@ -143,7 +144,18 @@ mod tests {
         assert!(!is_sound([run_word(0), EMPTY, run_word(2)], &runs[..2]), "no entries");
         let endless = [entry(1), entry(2), entry(3)];
         assert!(!is_sound([run_word(0), EMPTY, EMPTY], &endless), "a run without an end");
-        assert!(!is_sound([3 << 30, EMPTY, EMPTY], &[]), "a tag that is not in use");
+        assert!(!is_sound([3 << 30, EMPTY, EMPTY], &[]), "no box and no entries");
+    }
+
+    #[test]
+    fn boxes_belong_to_one_cell() {
+        let cell_box = Run::of_box(CellBox::WHOLE);
+        let runs = [cell_box, entry(1), entry(2 | LAST), entry(3 | LAST)];
+        assert!(is_sound([box_word(0), EMPTY, run_word(3)], &runs));
+        assert!(!is_sound([run_word(0), EMPTY, run_word(3)], &runs), "a box as lanes");
+        assert!(!is_sound([box_word(1), EMPTY, run_word(3)], &runs), "a gap");
+        assert!(!is_sound([box_word(0), EMPTY, box_word(3)], &runs), "no entries after a box");
+        assert!(!is_sound([box_word(0), EMPTY, EMPTY], &runs[..1]), "nothing but a box");
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! The walk of a ray through the cells.
 
 use super::ray::CellRay;
-use super::steps::{Level, Part};
+use super::steps::{Level, Sides};
 use crate::block::cells::{
-    Cell, EMPTY, GridHead, MOST_DEPTH, Run, SIDES, cell, resolution, side_ahead,
+    Cell, CellBox, EMPTY, GridHead, MOST_DEPTH, Run, SIDES, cell, resolution, side_ahead,
 };
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
@@ -32,37 +32,66 @@ pub(crate) fn walk<S: Simd, Q: Query>(
     query: &mut Q,
 ) -> bool {
     for head in cells.grids {
-        let first = head.first_word as usize;
-        let Some(n) = cells.words.get(first).map(|word| resolution(*word)) else { continue };
-        if n == [1; 3] {
-            // What lists a few large primitives is seen faster than where the ray is in it.
-            query.watch().step();
-            let word = cells.words.get(first + 1).copied().unwrap_or(EMPTY);
-            if let Cell::Run(run) = cell(word) {
-                if visit(s, cells, run, ray, slab, query) {
-                    return true;
-                }
-                continue;
-            }
-        }
-        let cell_ray = CellRay::new(head, n, ray);
-        if !cell_ray.is_near(head.finest) {
-            return from_afar(cells, ray, query);
-        }
-        let [enter, exit] = cell_ray.times();
-        let t_min = f64::from(ray.t_min);
-        let start = if t_min > enter { t_min } else { enter };
-        let t_bound = query.t_bound();
-        if !(start <= exit && start <= f64::from(t_bound)) {
-            continue;
-        }
-        let part = Part { start, exit };
-        let level = Level::outermost(s, &cell_ray, head.first_word, part, t_bound);
-        if walk_one(s, cells, level, cell_ray.turned, ray, slab, query) {
+        if walk_grid(s, cells, head, ray, slab, query) {
             return true;
         }
     }
     false
+}
+
+/// The same for one outermost grid.
+#[inline(always)]
+fn walk_grid<S: Simd, Q: Query>(
+    s: S,
+    cells: &Cells,
+    head: &GridHead,
+    ray: &PreparedRay,
+    slab: &impl Slab,
+    query: &mut Q,
+) -> bool {
+    let part = slab.part(&head.bounds, query.t_bound());
+    let first = head.first_word as usize;
+    let Some(n) = cells.words.get(first).map(|word| resolution(*word)) else { return false };
+    if part.is_empty() {
+        return false;
+    }
+    if n == [1; 3] {
+        // What lists a few large primitives is seen faster than where the ray is in it.
+        query.watch().step();
+        let word = cells.words.get(first + 1).copied().unwrap_or(EMPTY);
+        if let Cell::Run(run) = cell(word) {
+            return visit(s, cells, (run, EVER), ray, slab, query);
+        }
+    }
+    let cell_ray = CellRay::new(head, n, ray);
+    if !cell_ray.is_near(head.finest) {
+        return from_afar(cells, ray, query);
+    }
+    let mut part = [f64::from(part.near), f64::from(part.far)];
+    if !cell_ray.holds(cell_ray.at(part[0])) {
+        part = cell_ray.part(part);
+        // Written so that a NaN, from foreign bytes, ends it.
+        if !(part[0] <= part[1]) {
+            return false;
+        }
+    }
+    let [start, exit] = part;
+    let (from, exit) = (cell_ray.at(start), time_above(exit, start));
+    let level = Level::outermost(s, &cell_ray, head.first_word, from, exit);
+    follow(s, cells, level, (start, cell_ray.turned), ray, slab, query)
+}
+
+/// The time from `start` to `t`, rounded up if it is not negative. Finite, as walls that are never passed are beyond it.
+#[inline(always)]
+pub(super) fn time_above(t: f64, start: f64) -> f32 {
+    let time = ((t - start) * (1.0 + 1.0 / (1u64 << 22) as f64)) as f32;
+    if time < f32::MAX { time } else { f32::MAX }
+}
+
+/// A bound as a time from `start`.
+#[inline(always)]
+fn bound_of<S: Simd>(s: S, t_bound: f32, start: f64) -> <S as Width<4>>::V {
+    Width::<4>::splat(s, time_above(f64::from(t_bound), start))
 }
 
 /// For a ray from so far away that not even `f64` tells its cells apart: every block is tested through its box.
@@ -72,66 +101,106 @@ fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool 
     cells.leaves.intersect_all(Scalar, ray, &WideSlab::new(ray), query)
 }
 
-/// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search.
+/// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search. Times are counted from `start`.
 #[inline(always)]
-fn walk_one<S: Simd, Q: Query>(
+fn follow<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
     mut level: Level<<S as Width<4>>::V>,
-    turned: [u32; 3],
+    (start, turned): (f64, [u32; 3]),
     ray: &PreparedRay,
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     let octant = turned[0] & 1 | turned[1] & 2 | turned[2] & 4;
-    let mut outer = [level; MOST_DEPTH - 1];
+    let sides = Sides::new(s, turned);
+    // Where to go on behind inner grids.
+    let mut outer = [None; MOST_DEPTH - 1];
     let mut depth = 0;
+    let mut t_bound = query.t_bound();
+    let mut bound = bound_of(s, t_bound, start);
     loop {
         query.watch().step();
         let word = cells.words.get(level.place as usize).copied().unwrap_or(EMPTY);
-        let mut goes_on = true;
-        match cell(word) {
+        let goes_on = match cell(word) {
             Cell::Empty => {
                 let side = side_ahead(word, octant);
-                goes_on = if side > 0 { level.jump(s, SIDES[side]) } else { level.step(s) };
-            }
-            Cell::Run(first) => {
-                if visit(s, cells, first, ray, slab, query) {
-                    return true;
-                }
-                level.look_up_to(s, query.t_bound());
-                goes_on = level.step(s);
+                if side > 0 { level.jump(s, SIDES[side], bound) } else { level.step(s, bound) }
             }
             Cell::Grid(first) => {
                 // A sound block has neither grids outside the words nor deeper ones.
-                let n = cells.words.get(first).map(|word| resolution(*word));
-                if let (Some(n), Some(place)) = (n, outer.get_mut(depth)) {
-                    *place = level;
+                let n = cells.words.get(first).map_or([1; 3], |word| resolution(*word));
+                let inner = level.inner(s, (first as u32, n), turned);
+                if level.step(s, bound)
+                    && let Some(place) = outer.get_mut(depth)
+                {
+                    *place = Some(level);
                     depth += 1;
-                    level = level.inner(s, (first as u32, n), turned, query.t_bound());
                 }
+                level = inner;
+                true
             }
-            Cell::Unknown => return false,
-        }
-        while !goes_on {
-            if depth == 0 || level.ends_before_exit(query.t_bound()) {
+            Cell::Run(_) | Cell::Boxed(_) => {
+                let listed = match cell(word) {
+                    Cell::Boxed(first) => match part_in(s, cells, &level, first, sides, bound) {
+                        Some([near, far]) => {
+                            let part =
+                                [(start + f64::from(near)) as f32, (start + f64::from(far)) as f32];
+                            Some((first + 1, part))
+                        }
+                        None => None,
+                    },
+                    Cell::Run(first) => Some((first, EVER)),
+                    _ => None,
+                };
+                if let Some(listed) = listed {
+                    if visit(s, cells, listed, ray, slab, query) {
+                        return true;
+                    }
+                    if query.t_bound() < t_bound {
+                        t_bound = query.t_bound();
+                        bound = bound_of(s, t_bound, start);
+                    }
+                }
+                level.step(s, bound)
+            }
+        };
+        if !goes_on {
+            depth = depth.wrapping_sub(1);
+            let Some(Some(next)) = outer.get(depth) else { return false };
+            // Those before it on the stack come later still.
+            if !next.begins_before(bound) {
                 return false;
             }
-            depth -= 1;
-            level = outer[depth];
-            level.look_up_to(s, query.t_bound());
-            goes_on = level.step(s);
+            level = *next;
         }
     }
 }
 
-/// Offers `query` what the ray meets among the primitives of a run, block by block if it comes into their boxes: in a cell's corner
-/// there may be little of it.
+/// The times between which the ray is in the box of a cell, which is entry `first`; `None` if it is not up to the bound.
+#[inline(always)]
+fn part_in<S: Simd>(
+    s: S,
+    cells: &Cells,
+    level: &Level<<S as Width<4>>::V>,
+    first: usize,
+    sides: Sides<<S as Width<4>>::V>,
+    bound: <S as Width<4>>::V,
+) -> Option<[f32; 2]> {
+    let cell_box = cells.runs.get(first).map_or(CellBox::WHOLE, |run| run.cell_box());
+    level.part_in(s, cell_box, sides, bound)
+}
+
+/// All of a ray.
+const EVER: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
+
+/// Offers `query` what the ray meets among the primitives of a run, block by block if it comes into their boxes in a part of
+/// it: in a cell's corner there may be little of a block.
 #[inline(always)]
 fn visit<S: Simd, Q: Query>(
     s: S,
     cells: &Cells,
-    first: usize,
+    (first, [begin, end]): (usize, [f32; 2]),
     ray: &PreparedRay,
     slab: &impl Slab,
     query: &mut Q,
@@ -139,9 +208,9 @@ fn visit<S: Simd, Q: Query>(
     for run in cells.runs.get(first..).unwrap_or(&[]) {
         let leaf = run.leaf();
         let aabb = cells.leaves.aabb((leaf.kind(), leaf.number()));
-        if !slab.part(&aabb, query.t_bound()).is_empty()
-            && cells.leaves.intersect(s, leaf, ray, query)
-        {
+        let t_bound = query.t_bound();
+        let part = slab.part(&aabb, if end < t_bound { end } else { t_bound });
+        if !(part.is_empty() || part.far < begin) && cells.leaves.intersect(s, leaf, ray, query) {
             return true;
         }
         if run.is_last() {

@@ -15,9 +15,9 @@ pub(super) const FULL: u32 = 16;
 const MOST_INNER: f64 = 64.0;
 
 /// Costs in steps from cell to cell: a leaf block, how many primitives of a cell one holds, and coming into a grid.
-const BLOCK: f64 = 3.0;
+const BLOCK: f64 = 2.0;
 const IN_A_BLOCK: u32 = 12;
-const ENTRY: f64 = 2.0;
+const ENTRY: f64 = 4.0;
 
 /// The resolution of the outermost grid over `count` primitives, `coarser` times too coarse along each axis.
 pub(super) fn outer(bounds: &Aabb, options: &GridOptions, count: u32, coarser: u32) -> [u32; 3] {

@@ -1,8 +1,8 @@
 //! From lists of numbers to leaf blocks and runs: the finished block.
 
 use super::grow::Grown;
-use super::lists::{END, Room};
-use crate::block::cells::{Cell, LAST, Run, cell, run_word};
+use super::lists::{BOX_WORDS, END, Room, numbers};
+use crate::block::cells::{Cell, CellBox, LAST, Run, box_word, cell, run_word};
 use crate::block::leaf::{KIND_TRIANGLES, SPHERES, TRIANGLES, TriangleBlock, block_ref};
 use crate::block::{Census, Counts, KIND_GRID, LAYOUT_COMPACT, PartsMut};
 use crate::prim::{Packer, Shapes, Survey, geometries};
@@ -44,8 +44,8 @@ fn most_runs(listed: &[u32]) -> usize {
     for id in listed {
         in_list += 1;
         if id & END != 0 {
-            // Of triangles and of spheres.
-            runs += in_list.min(3 + in_list / 5);
+            // A box, and runs of triangles and of spheres.
+            runs += in_list.min(4 + in_list / 5);
             in_list = 0;
         }
     }
@@ -60,10 +60,10 @@ fn most_counts(
     listed: &[u32],
     size: usize,
 ) -> Option<Counts> {
-    let spheres = listed.iter().filter(|id| *id & !END >= census.triangle_limit).count();
+    let spheres = numbers(listed).filter(|id| id & !END >= census.triangle_limit).count();
     let counts = Counts {
         geometries: survey.geometry_count,
-        prim_ids: listed.len() as u32,
+        prim_ids: numbers(listed).count() as u32,
         grids: grown.heads.iter().flatten().count() as u32,
         words: grown.words as u32,
         sphere_blocks: spheres.div_ceil(SPHERES) as u32,
@@ -88,8 +88,8 @@ fn fill(
         *place = *head;
     }
     geometries(scene, table);
-    let is_triangle = |id: &&u32| **id & !END < census.triangle_limit;
-    let first_sphere = listed.iter().filter(is_triangle).count() as u32;
+    let is_triangle = |id: &u32| id & !END < census.triangle_limit;
+    let first_sphere = numbers(listed).filter(is_triangle).count() as u32;
     let mut emitter = Emitter {
         shapes: Shapes::new(scene, table),
         packer: Packer::new(triangle_blocks, sphere_blocks, 0, first_sphere),
@@ -101,8 +101,14 @@ fn fill(
     };
     for (out, word) in parts.words.iter_mut().zip(words) {
         *out = match cell(*word) {
-            Cell::Run(first) => emitter.list(listed.get(first..)?)?,
-            _ => *word,
+            Cell::Run(first) => run_word(emitter.list(listed.get(first + BOX_WORDS..)?)?),
+            Cell::Boxed(first) => {
+                let (cell_box, list) = listed.get(first..)?.split_first_chunk()?;
+                let first = emitter.cell_box(CellBox::from_words(*cell_box))?;
+                emitter.list(list)?;
+                box_word(first)
+            }
+            Cell::Empty | Cell::Grid(_) => *word,
         };
     }
     Some((emitter.packer.triangle_block_count() as u32, emitter.run_count as u32))
@@ -122,7 +128,14 @@ struct Emitter<'s, 'a, 'b> {
 }
 
 impl Emitter<'_, '_, '_> {
-    /// Packs a list that begins here, and returns the word of its cell.
+    /// Writes the box of a cell before its run, and returns its entry.
+    fn cell_box(&mut self, cell_box: CellBox) -> Option<u32> {
+        *self.runs.get_mut(self.run_count)? = Run::of_box(cell_box);
+        self.run_count += 1;
+        Some(self.run_count as u32 - 1)
+    }
+
+    /// Packs a list that begins here, and returns its first entry.
     fn list(&mut self, listed: &[u32]) -> Option<u32> {
         let first = self.run_count;
         for id in listed {
@@ -140,7 +153,7 @@ impl Emitter<'_, '_, '_> {
                 break;
             }
         }
-        Some(run_word(first as u32))
+        Some(first as u32)
     }
 
     /// The block and the lane of a primitive: where it is in the open block, or a new place.

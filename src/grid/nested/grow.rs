@@ -3,12 +3,15 @@
 use super::cost::{self, FULL};
 use super::distance;
 use super::large::{Large, for_each_other};
-use super::lists::{END, List, Room, Waiting};
+use super::lists::{BOX_WORDS, END, List, Room, Waiting, numbers};
 use crate::block::Census;
-use crate::block::cells::{EMPTY, GridHead, cell_count, grid_word, resolution_word, run_word};
+use crate::block::cells::{
+    CellBox, EMPTY, GridHead, box_word, cell_count, grid_word, resolution_word, run_word,
+};
 use crate::grid::options::GridOptions;
 use crate::grid::overlap::cells_near;
 use crate::grid::space::Space;
+use crate::math::Aabb;
 use crate::prim::{Shapes, Survey, geometries};
 use crate::scene::Scene;
 
@@ -58,22 +61,37 @@ pub(super) fn grow(
     Some(Grown { heads, words: room.words.len(), listed: room.listed.len(), most })
 }
 
-/// One cell that lists all large primitives.
+/// One cell that lists all large primitives. The grid's own box is as good as one in the cell.
 fn large_cell(large: &Large, room: &mut Room) -> Option<u32> {
     let first_word = room.words.len() as u32;
     room.words.push(resolution_word([1; 3]))?;
-    let word = list_cell(&mut room.listed, large.ids())?;
-    room.words.push(word)?;
+    let first = list_cell(&mut room.listed, CellBox::WHOLE, large.ids())?;
+    room.words.push(run_word(first))?;
     Some(first_word)
 }
 
-/// The word of a cell that is not divided, and its list.
-fn list_cell(listed: &mut List, ids: &[u32]) -> Option<u32> {
-    let first = listed.grow(ids.len())?;
-    let list = &mut listed.all()[first..];
+/// Lists what is in a cell that is not divided, and returns where.
+fn list_cell(listed: &mut List, cell_box: CellBox, ids: &[u32]) -> Option<u32> {
+    let first = listed.grow(BOX_WORDS + ids.len())?;
+    let (place, list) = listed.all()[first..].split_first_chunk_mut()?;
+    *place = cell_box.words();
     list.copy_from_slice(ids);
     *list.last_mut()? |= END;
-    Some(run_word(first as u32))
+    Some(first as u32)
+}
+
+/// The box of a cell's primitives, as far as it is in the cell and wider by what a walk may be off.
+fn box_in(space: &Space, cell: [u32; 3], shapes: &mut Shapes, ids: &[u32]) -> CellBox {
+    let mut aabb = Aabb::EMPTY;
+    for shape in ids.iter().filter_map(|id| shapes.get(id & !END)) {
+        aabb.add(&shape.aabb());
+    }
+    let (mut lower, mut upper) = (space.point(aabb.lower), space.point(aabb.upper));
+    for k in 0..3 {
+        lower[k] -= f64::from(cell[k]) + 2.0 * space.dilation[k];
+        upper[k] -= f64::from(cell[k]) - 2.0 * space.dilation[k];
+    }
+    CellBox::around(lower, upper)
 }
 
 /// The grid that all but large primitives are in.
@@ -139,19 +157,22 @@ impl Outermost<'_, '_> {
     /// Lists the cells with few primitives, and lets the others wait. Each word holds the end of the cell's list, which is
     /// where the next one's begins.
     fn part(&self, space: &Space, first: usize, room: &mut Room) -> Option<()> {
+        let Room { geometries, words, listed, lists: [list, _], waiting: [queue, _], .. } = room;
+        let mut shapes = Shapes::new(self.scene, geometries);
         let mut start = 0;
         for number in 0..cell_count(space.resolution) as usize {
-            let word = &mut room.words.all()[first + number];
+            let word = &mut words.all()[first + number];
             let end = *word;
             let count = end - start;
             *word = EMPTY;
             if count > FULL && self.options.most_depth() > 1 {
                 let place = space.place_of(space.cell(number as u32));
                 let word = (first + number) as u32;
-                room.waiting[0].push(&Waiting { place, word, first: start, count })?;
+                queue.push(&Waiting { place, word, first: start, count })?;
             } else if count > 0 {
-                let ids = &room.lists[0].all()[start as usize..end as usize];
-                *word = list_cell(&mut room.listed, ids)?;
+                let ids = &list.all()[start as usize..end as usize];
+                let cell_box = box_in(space, space.cell(number as u32), &mut shapes, ids);
+                *word = box_word(list_cell(listed, cell_box, ids)?);
             }
             start = end;
         }
@@ -179,7 +200,7 @@ impl<'s, 'a, 'r, 'b> Divider<'s, 'a, 'r, 'b> {
         most: u64,
         room: &'r mut Room<'b>,
     ) -> Self {
-        let total = (room.listed.len() + room.lists[0].len()) as u64;
+        let total = (numbers(room.listed.all()).count() + room.lists[0].len()) as u64;
         Divider { scene, space, options, most, room, total, finest: 1.0 }
     }
 
@@ -190,10 +211,7 @@ impl<'s, 'a, 'r, 'b> Divider<'s, 'a, 'r, 'b> {
             for number in 0..self.room.waiting[0].len() {
                 let cell = self.room.waiting[0].get(number)?;
                 if !self.divide(&cell, is_last)? {
-                    let list =
-                        &self.room.lists[0].all()[cell.first as usize..][..cell.count as usize];
-                    let word = list_cell(&mut self.room.listed, list)?;
-                    self.room.words.all()[cell.word as usize] = word;
+                    self.leave_whole(&cell)?;
                 }
             }
             self.room.lists.swap(0, 1);
@@ -202,6 +220,17 @@ impl<'s, 'a, 'r, 'b> Divider<'s, 'a, 'r, 'b> {
             self.room.waiting[1].clear();
         }
         Some(self.finest as u32)
+    }
+
+    /// Lists what is in a cell that waits.
+    fn leave_whole(&mut self, cell: &Waiting) -> Option<()> {
+        let Room { geometries, words, listed, lists: [list, _], .. } = &mut *self.room;
+        let ids = &list.all()[cell.first as usize..][..cell.count as usize];
+        let space = self.space.within(cell.place, [1; 3]);
+        let mut shapes = Shapes::new(self.scene, geometries);
+        let cell_box = box_in(&space, [0; 3], &mut shapes, ids);
+        words.all()[cell.word as usize] = box_word(list_cell(listed, cell_box, ids)?);
+        Some(())
     }
 
     /// Divides a cell, more coarsely if it must be; false when it stays whole.
@@ -265,8 +294,10 @@ impl<'s, 'a, 'r, 'b> Divider<'s, 'a, 'r, 'b> {
 
     /// Gives each cell its list: cells with few primitives one that stays, others one that waits.
     fn part(&mut self, space: &Space, first: usize, is_last: bool) -> Option<()> {
-        let Room { words, listed, lists: [_, next], waiting: [_, queue], pairs, .. } =
-            &mut *self.room;
+        let Room {
+            geometries, words, listed, lists: [_, next], waiting: [_, queue], pairs, ..
+        } = &mut *self.room;
+        let mut shapes = Shapes::new(self.scene, geometries);
         let words = &mut words.all()[first..];
         let mut start = listed.len();
         for (number, word) in words.iter_mut().enumerate() {
@@ -274,7 +305,7 @@ impl<'s, 'a, 'r, 'b> Divider<'s, 'a, 'r, 'b> {
             *word = if count == 0 {
                 NOTHING
             } else if count <= FULL || is_last {
-                listed.grow(count as usize)? as u32
+                (listed.grow(BOX_WORDS + count as usize)? + BOX_WORDS) as u32
             } else {
                 let place = space.place_of(space.cell(number as u32));
                 let (word, first) = ((first + number) as u32, next.grow(count as usize)? as u32);
@@ -289,12 +320,14 @@ impl<'s, 'a, 'r, 'b> Divider<'s, 'a, 'r, 'b> {
             list[(*word & !WAITS) as usize] = *id;
             *word += 1;
         }
-        // Each word now holds the end of the cell's list, which is where the next one's begins.
-        for word in words {
+        // Each word now holds the end of the cell's list, which is where the next one's box begins.
+        for (number, word) in words.iter_mut().enumerate() {
             if *word & WAITS == 0 {
                 let end = *word as usize;
-                listed[end - 1] |= END;
-                *word = run_word(start as u32);
+                let (place, list) = listed[start..end].split_first_chunk_mut()?;
+                *place = box_in(space, space.cell(number as u32), &mut shapes, list).words();
+                *list.last_mut()? |= END;
+                *word = box_word(start as u32);
                 start = end;
             } else {
                 *word = EMPTY;

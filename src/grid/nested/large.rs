@@ -1,12 +1,13 @@
 //! Large primitives, which are kept out of the cells.
 
 use crate::block::Census;
+use crate::block::leaf::TRIANGLES_AT_LEAST;
 use crate::math::{Aabb, wide};
 use crate::prim::{Prim, for_each_counted};
 use crate::scene::Scene;
 
-/// At most so many, and only those longer than this part of the scene.
-const MOST: usize = 16;
+/// At most so many, which are one block whatever vertices they share, and only those longer than this part of the scene.
+const MOST: usize = TRIANGLES_AT_LEAST;
 const LONG: f64 = 0.1;
 
 /// The largest primitives: tested by every ray that meets the box around them, and in no other cell.

@@ -8,9 +8,27 @@ use crate::storage::{ALIGNMENT, view_mut};
 /// Marks the last number of a cell's list. Numbers are below 2^30.
 pub(super) const END: u32 = 1 << 31;
 
-/// Bytes for each number that the cells may list: four lists of numbers, one of them in pairs, words, and two lists of
-/// cells that wait.
-const BYTES_A_REF: u64 = 20 + 4 / WORD_PER_REFS + 2 * WAITING_BYTES / WAITING_PER_REFS + 1;
+/// Words before the numbers of a cell's list: its box.
+pub(super) const BOX_WORDS: usize = 2;
+
+/// The numbers of all lists, without what is before each.
+pub(super) fn numbers(listed: &[u32]) -> impl Iterator<Item = u32> {
+    let mut skipped = 0;
+    listed.iter().copied().filter(move |word| {
+        let is_number = skipped == BOX_WORDS;
+        skipped = match is_number {
+            false => skipped + 1,
+            true if word & END != 0 => 0,
+            true => BOX_WORDS,
+        };
+        is_number
+    })
+}
+
+/// Bytes for each number that the cells may list: four lists of numbers, one of them in pairs, words, a box for each word,
+/// and two lists of cells that wait.
+const BYTES_A_REF: u64 =
+    20 + 8 / WORD_PER_REFS + 4 / WORD_PER_REFS + 2 * WAITING_BYTES / WAITING_PER_REFS + 1;
 /// One word for so many numbers, and this many in any case.
 const WORD_PER_REFS: u64 = 2;
 const WORDS_AT_LEAST: u64 = 256;
@@ -122,7 +140,7 @@ pub(super) struct Room<'b> {
     pub geometries: &'b mut [Geometry],
     /// The words of the finished block, but for lists instead of runs.
     pub words: List<'b>,
-    /// The lists of the cells that are not divided, each with an [`END`].
+    /// The lists of the cells that are not divided, each with a box before it and an [`END`].
     pub listed: List<'b>,
     /// The lists of cells that wait, and the lists of those that wait for the next round.
     pub lists: [List<'b>; 2],
@@ -141,10 +159,14 @@ fn words_for(refs: u64) -> u64 {
     refs / WORD_PER_REFS + WORDS_AT_LEAST
 }
 
+fn listed_for(refs: u64) -> u64 {
+    refs + BOX_WORDS as u64 * words_for(refs)
+}
+
 impl<'b> Room<'b> {
     /// The most numbers that cells can list while they grow in `size` bytes.
     pub fn most_refs(survey: &Survey, size: usize) -> u64 {
-        let taken = front(survey).unwrap_or(usize::MAX) as u64 + 4 * WORDS_AT_LEAST;
+        let taken = front(survey).unwrap_or(usize::MAX) as u64 + 12 * WORDS_AT_LEAST;
         // Seven parts are aligned.
         let left = (size as u64).saturating_sub(taken + 8 * ALIGNMENT as u64);
         (left / BYTES_A_REF).min(u64::from(END / 4))
@@ -152,7 +174,7 @@ impl<'b> Room<'b> {
 
     /// Where the words and lists that are kept begin: at the end of the memory.
     pub fn kept_from(most: u64, size: usize) -> Option<usize> {
-        let bytes = usize::try_from(4 * (words_for(most) + most)).ok()?;
+        let bytes = usize::try_from(4 * (words_for(most) + listed_for(most))).ok()?;
         Some(size.checked_sub(bytes)? / ALIGNMENT * ALIGNMENT)
     }
 
@@ -174,9 +196,9 @@ impl<'b> Room<'b> {
         let (scratch, kept) = bytes.split_at_mut_checked(Self::kept_from(most, bytes.len())?)?;
         let parts = counts.parts_mut(scratch)?;
         let most = usize::try_from(most).ok()?;
-        let words = words_for(most as u64) as usize;
+        let (words, listed) = (words_for(most as u64) as usize, listed_for(most as u64) as usize);
         let (words, listed) =
-            view_mut::<u32>(kept, 0, words + most)?.split_at_mut_checked(words)?;
+            view_mut::<u32>(kept, 0, words + listed)?.split_at_mut_checked(words)?;
         let waiting = (most / WAITING_PER_REFS as usize + 1) * Waiting::WORDS;
         let (queues, lists) = parts.rest.split_at_mut_checked(16 * waiting)?;
         let (first, second) = view_mut::<u64>(queues, 0, 2 * waiting)?.split_at_mut(waiting);
