@@ -6,8 +6,8 @@ use super::{SLACK, Seek, square_between};
 use crate::block::leaf::{KIND_SPHERES, Place};
 use crate::block::level::Level;
 use crate::math::float::sqrt;
-use crate::math::wide;
-use crate::prim::{Lanes, Leaves};
+use crate::math::{Bits, wide};
+use crate::prim::Leaves;
 use crate::ray::NONE;
 
 /// What is done for each instance that may be the closest: it gets the number, and returns the square of the distance beyond
@@ -98,7 +98,7 @@ impl Seek for NearInstances<'_, '_, '_> {
         let Some(block) = sphere_blocks.get(number).filter(|_| kind == KIND_SPHERES) else {
             return;
         };
-        for lane in Lanes(lanes & block.lanes()) {
+        for lane in Bits(lanes & block.lanes()) {
             self.consider(Place::of_lane(number as u32, block.first, lane as u32).prim(prim_ids));
         }
     }
