@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::exact::{self, Distance, Line, Meeting};
 use crate::math::rounding::{UNIT, UNIT32, gamma};
+use crate::math::wide::{cross, dot, minus};
 use crate::math::{sum_abs, wide};
 
 /// Where a ray's line meets a triangle.
@@ -84,16 +85,17 @@ pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeti
 pub(super) fn volumes(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = triangle.map(wide);
     let (o, d) = (wide(line.origin), wide(line.direction));
-    let (ra, rb, rc) = (a - o, b - o, c - o);
-    let edge = |p: DVec3, q: DVec3, pq: DVec3| d.dot((p + q).cross(pq));
-    [edge(rc, ra, a - c), edge(ra, rb, b - a), edge(rb, rc, c - b)]
+    let (ra, rb, rc) = (minus(a, o), minus(b, o), minus(c, o));
+    let edge = |p: DVec3, q: DVec3, pq: DVec3| dot(d, cross(p + q, pq));
+    [edge(rc, ra, minus(a, c)), edge(ra, rb, minus(b, a)), edge(rb, rc, minus(c, b))]
 }
 
 /// What they may be off.
 pub(super) fn volume_error(line: &Line, triangle: [[f32; 3]; 3]) -> f64 {
     let [a, b, c] = triangle.map(wide);
-    let [ra, rb, rc] = [a, b, c].map(|p| sum_abs(p - wide(line.origin)));
-    let side = sum_abs(b - a).max(sum_abs(c - b)).max(sum_abs(a - c));
+    let length = |p, q| sum_abs(minus(p, q));
+    let [ra, rb, rc] = [a, b, c].map(|p| length(p, wide(line.origin)));
+    let side = length(b, a).max(length(c, b)).max(length(a, c));
     let reach = ra.max(rb).max(rc);
     gamma(10) * sum_abs(wide(line.direction)) * 2.0 * reach * side
 }
@@ -129,22 +131,22 @@ struct Spanned {
 }
 
 impl Spanned {
-    #[inline(always)]
+    #[cfg_attr(target_pointer_width = "64", inline(always))]
     fn new(line: &Line, triangle: [[f32; 3]; 3]) -> Self {
         let [a, b, c] = triangle.map(wide);
         let d = wide(line.direction);
-        let (e1, e2) = (b - a, c - a);
-        let n = e1.cross(e2);
-        Spanned { to_plane: a - wide(line.origin), e1, e2, n, d, along: d.dot(n) }
+        let (e1, e2) = (minus(b, a), minus(c, a));
+        let n = cross(e1, e2);
+        Spanned { to_plane: minus(a, wide(line.origin)), e1, e2, n, d, along: dot(d, n) }
     }
 
     /// The weights of the second and the third vertex where the line meets the plane; 0 when they cannot be told.
     ///
     /// Source: \[MT97\].
-    #[inline(always)]
+    #[cfg_attr(target_pointer_width = "64", inline(always))]
     fn weights(&self) -> [f64; 2] {
-        let aside = self.to_plane.cross(self.d);
-        let [u, v] = [self.e2.dot(aside), -self.e1.dot(aside)];
+        let aside = cross(self.to_plane, self.d);
+        let [u, v] = [dot(self.e2, aside), -dot(self.e1, aside)];
         if self.along == 0.0 { [0.0; 2] } else { [u / self.along, v / self.along] }
     }
 }
@@ -161,8 +163,9 @@ pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeet
     clear_plane(line, triangle).or_else(|| exact_plane(line, triangle))
 }
 
-/// The same, or `None` where the plane is nearly parallel to the line.
-#[inline(always)]
+/// The same, or `None` where the plane is nearly parallel to the line. In line where room is no matter.
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
 pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let spanned = Spanned::new(line, triangle);
     let Spanned { to_plane, e1, e2, n, d, along } = spanned;
@@ -172,7 +175,7 @@ pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Triang
     if !(1024.0 * along_error < along.abs()) {
         return None;
     }
-    let t = to_plane.dot(n) / along;
+    let t = dot(to_plane, n) / along;
     let t_error = (sum_abs(to_plane) * size + t.abs() * along_error) / along.abs();
     // A hundredth for the divisor's own error, and the roundings of the quotient.
     let t_error = 1.01 * t_error + 3.0 * UNIT * t.abs();
@@ -181,7 +184,7 @@ pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Triang
 }
 
 /// The meeting with the plane, without error.
-fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
+pub(crate) fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
     let (t, t_error) = distance.approximate();
     // None of the volumes is of the other sign.

@@ -6,5 +6,7 @@ pub(crate) mod error_free;
 pub(crate) mod float;
 pub(crate) mod integer;
 pub(crate) mod rounding;
+pub(crate) mod wide;
 
-pub(crate) use aabb::{Aabb, sum_abs, wide};
+pub(crate) use aabb::Aabb;
+pub(crate) use wide::{sum_abs, wide};

@@ -21,6 +21,7 @@ use crate::block::Block;
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock,
 };
+use crate::kinds::SPHERES;
 use crate::math::Aabb;
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
@@ -133,7 +134,7 @@ impl Leaves<'_> {
         if kind == KIND_TRIANGLES {
             let Some(block) = self.triangle_blocks.get(number) else { return false };
             self.triangles(s, block, number, lanes & block.lanes(), ray, query)
-        } else if kind == KIND_SPHERES {
+        } else if kind == KIND_SPHERES && (SPHERES || Q::OF_INDEX) {
             let Some(block) = self.sphere_blocks.get(number) else { return false };
             self.spheres(block, number, lanes & block.lanes(), ray, query)
         } else {
@@ -141,6 +142,7 @@ impl Leaves<'_> {
         }
     }
 
+    /// Offers `query` what the ray meets among some lanes of a block; out of line for a backend that shall be small.
     #[inline(always)]
     fn triangles<S: Simd, Q: Query>(
         &self,
@@ -151,6 +153,48 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
+        let look = Look { block, number, lanes, ray, query };
+        if S::SMALL { s.run(look) } else { look.run(s) }
+    }
+    #[inline(never)]
+    fn spheres<Q: Query>(
+        &self,
+        block: &SphereBlock,
+        number: usize,
+        lanes: u32,
+        ray: &PreparedRay,
+        query: &mut Q,
+    ) -> bool {
+        query.watch().block(lanes.count_ones());
+        Lanes(lanes).any(|lane| {
+            if Q::OF_INDEX {
+                let place = Place::of_lane(number as u32, block.first, lane as u32);
+                return query.instance(place.prim(self.prim_ids));
+            }
+            let (centre, radius) = block.sphere(lane);
+            sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
+                let place = Place::of_lane(number as u32, block.first, lane as u32);
+                query.sphere(ray, &SphereLane { centre, radius, place, detail })
+            })
+        })
+    }
+}
+
+/// The first look at the triangles of a block.
+struct Look<'a, Q> {
+    block: &'a TriangleBlock,
+    number: usize,
+    lanes: u32,
+    ray: &'a PreparedRay,
+    query: &'a mut Q,
+}
+
+impl<Q: Query> Kernel for Look<'_, Q> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> bool {
+        let Look { block, number, lanes, ray, query } = self;
         query.watch().block(lanes.count_ones());
         let t_bound = query.t_bound();
         let found = if Q::ANY_BOXES {
@@ -174,29 +218,6 @@ impl Leaves<'_> {
             }
         }
         s.run(Several { block, number, t_bound, found: found.stored(), ray, query })
-    }
-
-    #[inline(never)]
-    fn spheres<Q: Query>(
-        &self,
-        block: &SphereBlock,
-        number: usize,
-        lanes: u32,
-        ray: &PreparedRay,
-        query: &mut Q,
-    ) -> bool {
-        query.watch().block(lanes.count_ones());
-        Lanes(lanes).any(|lane| {
-            if Q::OF_INDEX {
-                let place = Place::of_lane(number as u32, block.first, lane as u32);
-                return query.instance(place.prim(self.prim_ids));
-            }
-            let (centre, radius) = block.sphere(lane);
-            sieve::sphere(ray, query.t_bound(), centre, radius).is_some_and(|detail| {
-                let place = Place::of_lane(number as u32, block.first, lane as u32);
-                query.sphere(ray, &SphereLane { centre, radius, place, detail })
-            })
-        })
     }
 }
 
@@ -227,14 +248,15 @@ impl<Q: Query> Kernel for Several<'_, Q> {
         }
         let mut rest = candidates;
         while rest != 0 {
-            let lane = found.nearest(s, rest);
+            // The order matters to no answer.
+            let lane = if S::SMALL { rest.trailing_zeros() } else { found.nearest(s, rest) };
             rest &= !(1 << lane);
             let certain = Certain { sure: sure >> lane & 1 == 1, inside: false };
             if consider(block, number, lane, certain, ray, query) {
                 return true;
             }
             // What was found in a lane may be nearer than others.
-            if rest != 0 && query.t_bound() < t_bound {
+            if !S::SMALL && rest != 0 && query.t_bound() < t_bound {
                 rest &= found.up_to(s, ray, query.t_bound());
             }
         }

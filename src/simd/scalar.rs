@@ -220,6 +220,9 @@ impl<const N: usize> Width<N> for Scalar {
 impl Simd for Scalar {
     const FEW: u32 = 8;
 
+    /// Not where compilers make vectors of this code.
+    const SMALL: bool = !cfg!(any(target_feature = "sse2", target_feature = "neon"));
+
     #[inline(always)]
     fn corners(self, table: [f32; 16], list: &[u8; 8]) -> [f32; 16] {
         core::array::from_fn(|i| table[corner(list, i)])
