@@ -2,8 +2,10 @@
 # Everything that must hold before a change lands. Needs Rust and a C compiler; installs the rest
 # (Debian packages by name). Under 15 minutes on two cores.
 #
-#   ./check.sh            all of it
-#   ./check.sh STEP ...   some of it: format clippy build test backends docs header c fuzz embree stress compare bench
+#   ./check.sh            all of it, but for most of the other processors
+#   ./check.sh all        these too
+#   ./check.sh STEP ...   some of it: format clippy build test backends docs header c targets fuzz embree stress compare
+#                         bench, or all_targets
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
@@ -28,6 +30,7 @@ step_install() {
 step_format() {
     cargo fmt --all -- --check
     cargo fmt --manifest-path fuzz/Cargo.toml -- --check
+    cargo fmt --manifest-path targets/agree/Cargo.toml -- --check
 }
 
 step_clippy() {
@@ -43,6 +46,7 @@ step_build() {
     cargo build -p raykern --lib --no-default-features --features libm
     cargo build -p raykern --lib --no-default-features --features libm,alloc
     cargo build -p raykern --lib --no-default-features --features libm,capi
+    cargo build -p raykern --lib --no-default-features --features libm,full
     cargo build -p raykern --lib --features capi
     if cargo check -q -p raykern --lib --no-default-features 2>/dev/null; then
         echo "a build without std and without libm must be refused" >&2
@@ -82,6 +86,12 @@ step_header() {
 # The C programs once more, with address and undefined-behaviour sanitizers.
 step_c() { RAYKERN_SANITIZE=1 cargo test "${all[@]}" --test c_programs; }
 
+# Other processors in emulators: a Cortex-M, one of the other byte order, and WebAssembly.
+step_targets() { targets/run.sh short; }
+
+# Each of them.
+step_all_targets() { targets/run.sh all; }
+
 # Each fuzz target for ten seconds, from nothing; fuzz/README.md says how to run them for longer.
 step_fuzz() (
     cd fuzz
@@ -116,8 +126,12 @@ step_compare() { cargo run --release --example compare -- --runs 2 --budget 20 -
 # The comparison with Embree, cut short: its answers are checked, its times mean nothing here.
 step_bench() { cargo run --release -p raykern-bench --features embree -- --quick; }
 
-steps=(install format clippy build test backends docs header c fuzz embree stress compare bench)
-[ $# -eq 0 ] || steps=("$@")
+steps=(install format clippy build test backends docs header c targets fuzz embree stress compare bench)
+case ${1:-} in
+'') ;;
+all) steps=("${steps[@]/#targets/all_targets}") ;;
+*) steps=("$@") ;;
+esac
 for step in "${steps[@]}"; do
     started=$SECONDS
     echo "== $step"

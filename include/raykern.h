@@ -376,7 +376,7 @@ typedef struct RtPointHit {
 #define RT_ERROR_TRUNCATED 12
 // The block contradicts itself.
 #define RT_ERROR_CORRUPT 13
-// The block has a layout that this build of the library leaves out.
+// The block, the scene or the options ask for something that this build of the library leaves out.
 #define RT_ERROR_LAYOUT 14
 // The ray has no such hit.
 #define RT_ERROR_NOT_FOUND 15

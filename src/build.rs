@@ -11,6 +11,7 @@ use crate::choice::suits_grid;
 use crate::error::BuildError;
 use crate::grid::{self, GridKind, GridOptions};
 use crate::instance::{Placed, fixed_size, write};
+use crate::kinds::{GRID, INSTANCES, SPHERES, WIDE};
 use crate::list;
 use crate::math::Aabb;
 use crate::prim::{Survey, survey};
@@ -210,6 +211,9 @@ impl Plan {
         handful: u32,
     ) -> Result<Self, BuildError> {
         let survey = survey(scene)?;
+        if !SPHERES && scene.boxes().is_none() && survey.prim_limit != survey.triangle_limit {
+            return Err(BuildError::LeftOut);
+        }
         let census = Census::take(scene, &survey, &Caller::new(options.threads, None))?;
         // Instances are not refitted: their index is built anew.
         let refit = options.refit && scene.instance_count() == 0 && scene.boxes().is_none();
@@ -218,7 +222,7 @@ impl Plan {
             _ if kept.hittable() <= handful => Structure::List,
             Structure::Grid(_) if census.hittable() == 0 => Structure::List,
             Structure::Automatic if refit => options.bvh(),
-            Structure::Automatic if suits_grid(scene, &census, options.rays_per_prim) => {
+            Structure::Automatic if GRID && suits_grid(scene, &census, options.rays_per_prim) => {
                 Structure::Grid(GridOptions { kind: GridKind::Uniform, ..options.grid })
             }
             Structure::Automatic => options.bvh(),
@@ -227,9 +231,10 @@ impl Plan {
         let census = if matches!(structure, Structure::Grid(_)) { census } else { kept };
         let (size, minimum) = match structure {
             Structure::List => list::needs(&survey, &census)?,
-            Structure::Grid(grid) => grid::needs(scene, &survey, &census, &grid)?,
+            Structure::Grid(grid) if GRID => grid::needs(scene, &survey, &census, &grid)?,
             Structure::Bvh | Structure::Automatic => bvh::needs(&survey, &census)?,
-            Structure::Wide(width) => bvh::needs_wide(&survey, &census, width)?,
+            Structure::Wide(width) if WIDE => bvh::needs_wide(&survey, &census, width)?,
+            Structure::Grid(_) | Structure::Wide(_) => return Err(BuildError::LeftOut),
         };
         Ok(Plan { survey, census, structure, size, minimum })
     }
@@ -251,9 +256,12 @@ impl Plan {
         let how = How { effort, caller };
         match self.structure {
             Structure::List => list::build(scene, survey, census, bytes),
-            Structure::Grid(grid) => grid::build(scene, survey, census, &grid, bytes),
+            Structure::Grid(grid) if GRID => grid::build(scene, survey, census, &grid, bytes),
             Structure::Bvh | Structure::Automatic => bvh::build(scene, survey, census, &how, bytes),
-            Structure::Wide(width) => bvh::build_wide(scene, survey, census, width, &how, bytes),
+            Structure::Wide(width) if WIDE => {
+                bvh::build_wide(scene, survey, census, width, &how, bytes)
+            }
+            Structure::Grid(_) | Structure::Wide(_) => Err(BuildError::LeftOut),
         }
     }
 }
@@ -291,6 +299,7 @@ impl<'s> Job<'s> {
         let own = Plan::new(scene, options, asked, handful)?;
         let level = match scene.instance_count() {
             0 => None,
+            _ if !INSTANCES => return Err(BuildError::LeftOut),
             _ => Some(LevelPlan::new(scene, options, asked, own.census.bounds)?),
         };
         let sum = |own: usize, index: fn(&Plan) -> usize| match &level {
@@ -369,8 +378,8 @@ impl BuildOptions<'_> {
     /// The structure of a BVH with this layout.
     pub(crate) fn bvh(&self) -> Structure {
         match self.layout {
-            Layout::Automatic => Structure::Wide(16),
-            Layout::Compact => Structure::Bvh,
+            Layout::Automatic if WIDE => Structure::Wide(16),
+            Layout::Automatic | Layout::Compact => Structure::Bvh,
             Layout::Wide(width) => Structure::Wide(width),
         }
     }

@@ -4,6 +4,7 @@ use crate::block::level::Level;
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
+use crate::kinds::{GRID, WIDE};
 use crate::levels::Shown;
 use crate::math::float::sqrt;
 use crate::point::{Image, NearInstances, Nearest, Seek};
@@ -125,12 +126,12 @@ fn closest_in(
 
 fn search(block: &Block, nearest: &mut impl Seek) {
     match block.bundles {
-        Bundles::Sixteen(bundles) => bvh::search_wide(bundles, nearest),
-        Bundles::Eight(bundles) => bvh::search_wide(bundles, nearest),
-        Bundles::Four(bundles) => bvh::search_wide(bundles, nearest),
-        Bundles::None => match block.header.kind {
+        Bundles::Sixteen(bundles) if WIDE => bvh::search_wide(bundles, nearest),
+        Bundles::Eight(bundles) if WIDE => bvh::search_wide(bundles, nearest),
+        Bundles::Four(bundles) if WIDE => bvh::search_wide(bundles, nearest),
+        _ => match block.header.kind {
             KIND_BVH => bvh::search(block.nodes, nearest),
-            KIND_GRID => {
+            KIND_GRID if GRID => {
                 let Block { grids, words, runs, .. } = *block;
                 let leaves = Leaves::of(block);
                 grid::search(&Cells { grids, words, runs, leaves }, nearest);

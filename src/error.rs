@@ -28,6 +28,8 @@ pub enum BuildError {
     /// The scene has more primitives than 32 bits can number, or asks for more memory than the
     /// machine can address.
     TooLarge,
+    /// This build of the library leaves out what was asked for, or what is in the scene.
+    LeftOut,
     /// Bundles are 4, 8 or 16 wide.
     NoSuchLayout {
         /// The width asked for.
@@ -74,7 +76,7 @@ pub enum OpenError {
     Version,
     /// Fewer bytes than the block says it has.
     Truncated,
-    /// The block holds a layout that this build of the library leaves out.
+    /// The block holds something that this build of the library leaves out.
     Layout,
     /// The contents contradict themselves.
     Corrupt,
@@ -96,6 +98,7 @@ impl fmt::Display for BuildError {
             }
             BuildError::Misaligned => f.write_str("the memory is not aligned to 64 bytes"),
             BuildError::TooLarge => f.write_str("the scene is too large to be numbered or stored"),
+            BuildError::LeftOut => f.write_str("this build of the library leaves that out"),
             BuildError::NoSuchLayout { width } => {
                 write!(f, "there are no bundles of {width} lanes: 4, 8 or 16")
             }
@@ -130,7 +133,7 @@ impl fmt::Display for OpenError {
             OpenError::ByteOrder => "the block was written on a machine of the other byte order",
             OpenError::Version => "the block is of another version of the format",
             OpenError::Truncated => "the block is longer than the bytes given",
-            OpenError::Layout => "this build of the library leaves out the block's layout",
+            OpenError::Layout => "this build of the library leaves out what the block holds",
             OpenError::Corrupt => "the block's contents contradict themselves",
             OpenError::Linked => "the block refers to other blocks by address and was not packed",
         })

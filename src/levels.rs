@@ -17,7 +17,7 @@ use crate::query::{
 };
 use crate::ray::{Hit, Late, NONE, PreparedRay, Ray, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
-use crate::trace::{AnyHit, ClosestHit, ClosestMet, ask, trace};
+use crate::trace::{AnyHit, ClosestHit, ClosestMet, MEMORY, ask, trace};
 
 /// The closest hit of a block with instances among what `options` leave.
 #[inline(never)]
@@ -32,7 +32,7 @@ pub(crate) fn closest<D: Across, W: Watch>(
         if place.is_empty() {
             return None;
         }
-        let question = ClosestHit::<D, _, 1>::new(place.choice(options), watch.lend());
+        let question = ClosestHit::<D, _, MEMORY>::new(place.choice(options), watch.lend());
         let hit = ask(place.block, ray, question)?;
         Some(Hit { instance: place.instance, ..hit })
     };

@@ -73,6 +73,7 @@ mod grid;
 mod hits;
 mod instance;
 mod interval;
+mod kinds;
 mod levels;
 mod list;
 mod math;

@@ -6,6 +6,7 @@ use crate::block::{Counts, Finished, Header, KIND_GRID, Motion, PartsMut};
 use crate::bvh::{Cost, refit_bundles, refit_nodes};
 use crate::caller::Caller;
 use crate::error::RefitError;
+use crate::kinds::WIDE;
 use crate::math::Aabb;
 use crate::prim::{self, Leaves, Source, geometry_table, refit_leaves, survey};
 use crate::scene::Scene;
@@ -61,9 +62,9 @@ fn renew(bytes: &mut [u8], scene: &Scene, caller: &Caller) -> Option<f32> {
     let leaves = &Leaves { triangle_blocks, sphere_blocks, prim_ids };
     let mut cost = Cost::default();
     let bounds = match layout {
-        4 => refit_bundles(view::<4>(bundles, &counts)?, leaves, &mut cost),
-        8 => refit_bundles(view::<8>(bundles, &counts)?, leaves, &mut cost),
-        16 => refit_bundles(view::<16>(bundles, &counts)?, leaves, &mut cost),
+        4 if WIDE => refit_bundles(view::<4>(bundles, &counts)?, leaves, &mut cost),
+        8 if WIDE => refit_bundles(view::<8>(bundles, &counts)?, leaves, &mut cost),
+        16 if WIDE => refit_bundles(view::<16>(bundles, &counts)?, leaves, &mut cost),
         _ if nodes.is_empty() => box_of_list(leaves, &mut cost),
         _ => refit_nodes(nodes, leaves, &mut cost),
     };

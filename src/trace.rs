@@ -6,6 +6,7 @@ use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place};
 use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
+use crate::kinds::{GRID, WIDE};
 use crate::math::Bits;
 use crate::prim::Leaves;
 use crate::query::{
@@ -44,6 +45,9 @@ pub(crate) struct ClosestHit<D, W, const MEMORY: usize> {
     watch: W,
     decide: PhantomData<D>,
 }
+
+/// Half a kilobyte of stack, which is spent only where there is plenty: see [`Closest`].
+pub(crate) const MEMORY: usize = if cfg!(target_pointer_width = "64") { 1 } else { 0 };
 
 /// Whether anything is hit that the filter leaves.
 #[derive(Clone, Copy)]
@@ -293,7 +297,7 @@ impl<'m, D: Decide> Question<'m> for LocateHit<D> {
 pub(crate) struct ClosestMet(pub Choice);
 
 impl<'m> Question<'m> for ClosestMet {
-    type Query = Closest<'m, Exact, (), 1>;
+    type Query = Closest<'m, Exact, (), MEMORY>;
     type Answer = Option<ExactMet>;
     const RARE: bool = true;
 
@@ -332,7 +336,9 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
         let Ask { block, ray, question } = self;
         // Parts are not lent to what is out of line, which would have them all computed.
         let block = &block.parts();
-        let Some((mut late, slab)) = ray.set_out(s, block.header.reach) else {
+        let reach = block.header.reach;
+        let ready = if S::SMALL { ray.set_out_apart(s, reach) } else { ray.set_out(s, reach) };
+        let Some((mut late, slab)) = ready else {
             return ask_odd(block.whole, ray, question);
         };
         let mut query = question.query(block, late.t_max);
@@ -398,16 +404,21 @@ pub(crate) fn trace<S: Simd, Q: Query>(
 ) -> bool {
     let leaves = &Leaves::of(block);
     match block.bundles {
-        Bundles::Sixteen(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        Bundles::Eight(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        Bundles::Four(bundles) => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        Bundles::None => match block.header.kind {
-            KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray.prepare(), slab, query),
-            KIND_GRID => {
-                let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
-                grid::walk(s, &Cells { grids, words, runs, leaves }, ray.prepare(), slab, query)
+        Bundles::Sixteen(bundles) if WIDE => {
+            bvh::traverse_wide(s, bundles, leaves, ray, slab, query)
+        }
+        Bundles::Eight(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
+        Bundles::Four(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
+        _ => {
+            let ray = ray.prepare();
+            match block.header.kind {
+                KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
+                KIND_GRID if GRID => {
+                    let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
+                    grid::walk(s, &Cells { grids, words, runs, leaves }, ray, slab, query)
+                }
+                _ => leaves.intersect_all(s, ray, slab, query),
             }
-            _ => leaves.intersect_all(s, ray.prepare(), slab, query),
-        },
+        }
     }
 }

@@ -7,14 +7,15 @@ use std::path::{Path, PathBuf};
 
 /// Each module and what it may name; whatever is lower stands before.
 const HOUSE: &[(&str, &[&str])] = &[
+    ("kinds", &[]),
     ("math", &[]),
     ("error", &[]),
     ("storage", &[]),
     ("simd", &[]),
     ("caller", &[]),
-    ("exact", &["math"]),
+    ("exact", &["kinds", "math"]),
     ("ray", &["exact", "math", "simd"]),
-    ("block", &["error", "math", "storage"]),
+    ("block", &["error", "kinds", "math", "storage"]),
     ("scene", &["block", "math"]),
     ("instance", &["block", "error", "exact", "math", "ray", "scene"]),
     ("interval", &["exact", "math"]),
@@ -23,7 +24,10 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("query", &["block", "exact", "interval", "math", "ray", "sieve", "simd"]),
     (
         "prim",
-        &["block", "caller", "error", "interval", "math", "query", "ray", "scene", "sieve", "simd"],
+        &[
+            "block", "caller", "error", "interval", "kinds", "math", "query", "ray", "scene",
+            "sieve", "simd",
+        ],
     ),
     ("point", &["block", "instance", "math", "prim", "query", "ray"]),
     ("choice", &["block", "math", "prim", "scene"]),
@@ -40,24 +44,27 @@ const HOUSE: &[(&str, &[&str])] = &[
         ],
     ),
     ("surface", &["exact", "instance", "interval", "math"]),
-    ("trace", &["block", "bvh", "grid", "prim", "query", "ray", "simd"]),
+    ("trace", &["block", "bvh", "grid", "kinds", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
     ("levels", &["block", "instance", "math", "prim", "query", "ray", "simd", "trace"]),
     ("hits", &["block", "levels", "query", "ray", "trace"]),
-    ("closest", &["block", "bvh", "grid", "levels", "math", "point", "prim", "query", "ray"]),
+    (
+        "closest",
+        &["block", "bvh", "grid", "kinds", "levels", "math", "point", "prim", "query", "ray"],
+    ),
     (
         "accel",
         &[
-            "batch", "block", "bvh", "closest", "error", "grid", "hits", "instance", "levels",
-            "prim", "query", "ray", "scene", "storage", "surface", "trace",
+            "batch", "block", "bvh", "closest", "error", "grid", "hits", "instance", "kinds",
+            "levels", "prim", "query", "ray", "scene", "storage", "surface", "trace",
         ],
     ),
-    ("refit", &["block", "bvh", "caller", "error", "math", "prim", "scene", "storage"]),
+    ("refit", &["block", "bvh", "caller", "error", "kinds", "math", "prim", "scene", "storage"]),
     (
         "build",
         &[
-            "accel", "block", "bvh", "caller", "choice", "error", "grid", "instance", "list",
-            "math", "prim", "refit", "scene", "storage",
+            "accel", "block", "bvh", "caller", "choice", "error", "grid", "instance", "kinds",
+            "list", "math", "prim", "refit", "scene", "storage",
         ],
     ),
     ("pack", &["accel", "block", "build", "error", "storage"]),

@@ -51,8 +51,12 @@ fn compiler(cpp: bool) -> Command {
     build.out_dir(target()).get_compiler().to_command()
 }
 
-/// Compiles `source` with `flags`, links it and runs it.
-fn program(name: &str, source: &str, cpp: bool, flags: &[&str]) {
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
+}
+
+/// Compiles `source` with `flags`, links it and runs it; returns what it printed.
+fn program(name: &str, source: &str, cpp: bool, flags: &[&str]) -> String {
     let library = library().join("libraykern.a");
     let binary = target().join(name);
     let mut command = compiler(cpp);
@@ -64,7 +68,7 @@ fn program(name: &str, source: &str, cpp: bool, flags: &[&str]) {
     command.args(["-x", language]).arg(root().join(source)).args(["-x", "none"]);
     run(command.arg(library).args(SYSTEM).arg("-o").arg(&binary));
     // Memory of the programs is never freed.
-    run(Command::new(binary).env("ASAN_OPTIONS", "detect_leaks=0"));
+    run(Command::new(binary).env("ASAN_OPTIONS", "detect_leaks=0"))
 }
 
 #[test]
@@ -122,6 +126,21 @@ fn instances() {
 #[test]
 fn control() {
     program("control", "c_tests/control.c", false, &["-std=c11", "-frounding-math"]);
+}
+
+/// The picture that boards give, from a block that was baked: as in `targets/picture.txt`.
+#[test]
+fn picture() {
+    let targets = root().join("targets");
+    let board = targets.join("board/host.c");
+    let (include, block) = (targets.join("board"), format!("-Wa,-I,{}", targets.display()));
+    let flags = ["-std=c11", "-ffp-contract=off", "-I", text(&include), &block, text(&board)];
+    let printed = program("picture", "targets/programs/picture.c", false, &flags);
+    let expected = std::fs::read_to_string(targets.join("picture.txt")).unwrap();
+    let lines = |text: &str| -> Vec<String> {
+        text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect()
+    };
+    assert_eq!(lines(&printed), lines(&expected));
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::ray::{Hit, NONE, Ray};
 use crate::scene::Instance;
 use crate::storage::ALIGNMENT;
 use crate::surface::Surface;
-use crate::trace::{self, AnyHit, ClosestHit};
+use crate::trace::{self, AnyHit, ClosestHit, MEMORY};
 
 use info::info_of;
 pub use info::{Info, Kind, Layout};
@@ -131,7 +131,7 @@ impl<'m> Accel<'m> {
         if self.0.has_level() {
             return self.intersect_levels(ray);
         }
-        trace::ask(self.0, ray, ClosestHit::<Exact, _, 1>::new(Choice::EVERYTHING, ()))
+        trace::ask(self.0, ray, ClosestHit::<Exact, _, MEMORY>::new(Choice::EVERYTHING, ()))
     }
 
     /// Whether anything is hit: true exactly when [`intersect`](Self::intersect) finds a hit.
@@ -181,7 +181,7 @@ impl<'m> Accel<'m> {
                 batch::ask_all(block, rays, hits, question);
             }
             Precision::Watertight => {
-                let question = ClosestHit::<Watertight, _, 1>::new(choice, ());
+                let question = ClosestHit::<Watertight, _, MEMORY>::new(choice, ());
                 batch::ask_each(block, rays, hits, question);
             }
         }
@@ -240,10 +240,10 @@ impl<'m> Accel<'m> {
         }
         match options.precision {
             Precision::Exact => {
-                trace::ask(block, ray, ClosestHit::<Exact, _, 1>::new(choice, watch))
+                trace::ask(block, ray, ClosestHit::<Exact, _, MEMORY>::new(choice, watch))
             }
             Precision::Watertight => {
-                trace::ask(block, ray, ClosestHit::<Watertight, _, 1>::new(choice, watch))
+                trace::ask(block, ray, ClosestHit::<Watertight, _, MEMORY>::new(choice, watch))
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use crate::block::level::Level;
 use crate::block::{Block, Bundles, KIND_BVH, KIND_GRID, KIND_LIST};
+use crate::kinds::{GRID, WIDE};
 use crate::prim::{self, Leaves};
 use crate::{bvh, grid};
 
@@ -14,17 +15,17 @@ pub(super) fn block_is_sound(block: &Block) -> bool {
     let no_motion = header.counts.motions == 0;
     let structure = match (header.kind, bundles) {
         (KIND_LIST, Bundles::None) => no_grid && no_nodes,
-        (KIND_GRID, Bundles::None) => {
+        (KIND_GRID, Bundles::None) if GRID => {
             no_nodes && no_motion && grid::grids_are_sound(grids, words, runs, &leaves)
         }
         (KIND_BVH, Bundles::None) => no_grid && bvh::tree_is_sound(nodes, &leaves),
-        (KIND_BVH, Bundles::Four(bundles)) => {
+        (KIND_BVH, Bundles::Four(bundles)) if WIDE => {
             no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
         }
-        (KIND_BVH, Bundles::Eight(bundles)) => {
+        (KIND_BVH, Bundles::Eight(bundles)) if WIDE => {
             no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
         }
-        (KIND_BVH, Bundles::Sixteen(bundles)) => {
+        (KIND_BVH, Bundles::Sixteen(bundles)) if WIDE => {
             no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
         }
         _ => false,

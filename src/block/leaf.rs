@@ -56,15 +56,18 @@ impl TriangleBlock {
     #[inline(always)]
     pub fn triangle(&self, i: usize) -> [[f32; 3]; 3] {
         let [x, y, z] = &self.vertices;
-        self.corner_numbers(i).map(|v| [x[v], y[v], z[v]])
+        let [a, b, c] = self.corner_numbers(i);
+        let vertex = |v: usize| [x[v % TRIANGLES], y[v % TRIANGLES], z[v % TRIANGLES]];
+        [vertex(a), vertex(b), vertex(c)]
     }
 
     /// The numbers of the vertices of triangle `i < 16`, each below 16 whatever the block holds.
     #[inline(always)]
     pub fn corner_numbers(&self, i: usize) -> [usize; 3] {
-        let (byte, shift) = nibble(i % TRIANGLES);
+        let (byte, shift) = nibble(i);
         let [a, b, c] = &self.corners;
-        [a, b, c].map(|list| usize::from(list[byte] >> shift & 15))
+        let number = |list: &[u8; TRIANGLES / 2]| usize::from(list[byte] >> shift & 15);
+        [number(a), number(b), number(c)]
     }
 
     /// The lanes that can be hit, one bit each.
@@ -89,7 +92,7 @@ impl TriangleBlock {
 /// The byte of triangle `i < 16` in a list of corners, and the bits below its nibble.
 #[inline(always)]
 fn nibble(i: usize) -> (usize, usize) {
-    let place = i % 2 * 8 + i / 2;
+    let place = i % 2 * 8 + i / 2 % 8;
     (place / 2, 4 * (place % 2))
 }
 

@@ -6,8 +6,11 @@ use super::bundle::Bundles;
 use super::cells::{GridHead, Run};
 use super::leaf::{Geometry, SphereBlock, TriangleBlock};
 use super::level::Level;
-use super::{BYTE_ORDER, BvhNode, Counts, Header, LAYOUT_COMPACT, MAGIC, Motion, VERSION};
+use super::{
+    BYTE_ORDER, BvhNode, Counts, Header, KIND_GRID, LAYOUT_COMPACT, MAGIC, Motion, VERSION,
+};
 use crate::error::OpenError;
+use crate::kinds::{GRID, INSTANCES, SPHERES, WIDE};
 use crate::storage::{self, ALIGNMENT};
 
 /// A block as typed slices.
@@ -84,13 +87,14 @@ impl<'m> Finished<'m> {
     /// Whether it has instances.
     #[inline(always)]
     pub fn has_level(self) -> bool {
-        self.header().level != 0
+        INSTANCES && self.header().level != 0
     }
 
     /// What belongs to its instances, if it has any.
     pub fn level(self) -> Option<Level<'m>> {
         match self.header().level {
             0 => None,
+            _ if !INSTANCES => None,
             lines => Level::of(self, lines as usize * ALIGNMENT),
         }
     }
@@ -175,7 +179,7 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
     if header.version != VERSION {
         return Err(OpenError::Version);
     }
-    if !matches!(header.layout, LAYOUT_COMPACT | 4 | 8 | 16) {
+    if !matches!(header.layout, LAYOUT_COMPACT | 4 | 8 | 16) || !is_known(header) {
         return Err(OpenError::Layout);
     }
     let counts = &header.counts;
@@ -185,6 +189,15 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
         return Err(OpenError::Corrupt);
     }
     Ok((header, end))
+}
+
+/// Whether this build of the library reads what is in a block.
+fn is_known(header: &Header) -> bool {
+    (WIDE || header.layout == LAYOUT_COMPACT)
+        && (GRID || header.kind != KIND_GRID)
+        // The index over instances holds their boxes as if they were spheres.
+        && (SPHERES || INSTANCES || header.counts.sphere_blocks == 0)
+        && (INSTANCES || header.level == 0)
 }
 
 /// The way through the parts of a finished block.

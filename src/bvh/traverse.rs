@@ -87,12 +87,12 @@ impl Stack {
 
     /// The last node pushed that the ray enters before `t_bound`.
     fn pop(&mut self, t_bound: f32) -> Option<u32> {
-        while let Some((node, near)) = self.entries[..self.count].last().copied() {
-            self.count -= 1;
+        loop {
+            self.count = self.count.checked_sub(1)?;
+            let (node, near) = *self.entries.get(self.count)?;
             if near <= t_bound {
                 return Some(node);
             }
         }
-        None
     }
 }

@@ -31,7 +31,8 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
                 return next_pair as usize == nodes.len();
             }
             count -= 1;
-            at = stack[count];
+            let Some(entry) = stack.get(count) else { return false };
+            at = *entry;
         } else {
             let Some(entry) = stack.get_mut(count) else { return false };
             if node.first != next_pair || next_pair as usize + 1 >= nodes.len() {

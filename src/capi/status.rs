@@ -36,7 +36,7 @@ pub const RT_ERROR_BLOCK_VERSION: RtStatus = 11;
 pub const RT_ERROR_TRUNCATED: RtStatus = 12;
 /// The block contradicts itself.
 pub const RT_ERROR_CORRUPT: RtStatus = 13;
-/// The block has a layout that this build of the library leaves out.
+/// The block, the scene or the options ask for something that this build of the library leaves out.
 pub const RT_ERROR_LAYOUT: RtStatus = 14;
 /// The ray has no such hit.
 pub const RT_ERROR_NOT_FOUND: RtStatus = 15;
@@ -118,6 +118,7 @@ impl From<BuildError> for Error {
             BuildError::OutOfMemory { .. } => Error::OutOfMemory,
             BuildError::Misaligned => Error::Misaligned,
             BuildError::TooLarge => Error::TooLarge,
+            BuildError::LeftOut => Error::Layout,
             BuildError::NoSuchLayout { .. } => Error::InvalidArgument,
             BuildError::SingularInstance { .. } => Error::Singular,
             BuildError::NestedInstance { .. } => Error::Nested,
@@ -166,7 +167,7 @@ fn message(status: RtStatus) -> &'static CStr {
         RT_ERROR_BLOCK_VERSION => c"the block is of another version of the format",
         RT_ERROR_TRUNCATED => c"the block is longer than the bytes given",
         RT_ERROR_CORRUPT => c"the block contradicts itself",
-        RT_ERROR_LAYOUT => c"this build of the library leaves out the block's layout",
+        RT_ERROR_LAYOUT => c"this build of the library leaves that out",
         RT_ERROR_NOT_FOUND => c"the ray has no such hit",
         RT_ERROR_INTERNAL => c"a fault of the library was stopped",
         RT_ERROR_CANCELLED => c"the caller cancelled the build",

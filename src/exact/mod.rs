@@ -22,6 +22,7 @@ use core::cmp::Ordering;
 pub(crate) use sphere::{Roots, from_centre};
 pub(crate) use triangle::{has_area, normal, volumes};
 
+use crate::kinds::SPHERES;
 use crate::math::binary::Binary;
 use sphere::Root;
 use triangle::Quotient;
@@ -56,9 +57,8 @@ impl Meeting {
         match (self, other) {
             (Meeting::Triangle(p), Meeting::Triangle(q)) => {
                 let [first, ..] = p;
-                let points = || p.iter().chain(q);
-                p.iter().all(|vertex| q.contains(vertex))
-                    || (0..3).any(|k| points().all(|point| point[k] == first[k]))
+                let level = |k| p.iter().chain(q).all(|point| point.get(k) == first.get(k));
+                p.iter().all(|vertex| q.contains(vertex)) || (0..3).any(level)
             }
             (
                 Meeting::Sphere { centre, radius, root },
@@ -82,6 +82,7 @@ impl Distance {
     pub fn new(line: &Line, meeting: &Meeting) -> Option<Self> {
         match *meeting {
             Meeting::Triangle(corners) => Quotient::new(line, corners).map(Distance::Quotient),
+            Meeting::Sphere { .. } if !SPHERES => None,
             Meeting::Sphere { centre, radius, root } => {
                 let roots = Roots::new(line, centre, radius)?;
                 Some(Distance::Root(Root::new(roots, root)))
@@ -93,6 +94,8 @@ impl Distance {
     pub fn approximate(&self) -> (f64, f64) {
         match self {
             Distance::Quotient(t) => t.approximate(),
+            // Nothing has such a distance.
+            Distance::Root(_) if !SPHERES => (0.0, 0.0),
             Distance::Root(t) => t.approximate(),
         }
     }
@@ -101,6 +104,7 @@ impl Distance {
     pub fn compare(&self, other: &Distance) -> Ordering {
         match (self, other) {
             (Distance::Quotient(p), Distance::Quotient(q)) => p.compare(q),
+            _ if !SPHERES => Ordering::Equal,
             (Distance::Root(p), Distance::Quotient(q)) => p.compare_with(q),
             (Distance::Quotient(p), Distance::Root(q)) => q.compare_with(p).reverse(),
             (Distance::Root(p), Distance::Root(q)) => p.compare(q),
@@ -119,6 +123,7 @@ impl Distance {
         let x = Quotient::float(x);
         match self {
             Distance::Quotient(t) => t.compare(&x),
+            Distance::Root(_) if !SPHERES => Ordering::Equal,
             Distance::Root(t) => t.compare_with(&x),
         }
     }

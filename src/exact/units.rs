@@ -61,6 +61,10 @@ impl Units {
     }
 }
 
+/// Whether formulas are compiled for short numbers as well. They take a fraction of the time; but on a processor of 32 bits
+/// `i128` is slow itself, and three copies of the code are more than all the rest of a query.
+pub(super) const SHORT: bool = cfg!(target_pointer_width = "64");
+
 /// A name for `Integer<6>`, which nearly everything fits that `i128` does not.
 pub(super) type Medium = Integer<6>;
 
@@ -68,8 +72,10 @@ pub(super) type Medium = Integer<6>;
 macro_rules! in_shortest {
     ($bits:expr, $long:ty, $formula:ident($($argument:expr),*)) => {
         match $bits {
-            0..128 => $formula::<i128>($($argument),*),
-            128..=384 => $formula::<$crate::exact::units::Medium>($($argument),*),
+            0..128 if $crate::exact::units::SHORT => $formula::<i128>($($argument),*),
+            128..=384 if $crate::exact::units::SHORT => {
+                $formula::<$crate::exact::units::Medium>($($argument),*)
+            }
             _ => $formula::<$long>($($argument),*),
         }
     };

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::plane::PlaneMeeting;
 use crate::exact::{self, Distance, Line, Meeting};
 use crate::math::rounding::{UNIT32, gamma};
+use crate::math::wide::{cross, dot, minus};
 use crate::math::{sum_abs, wide};
 
 /// Where a ray's line meets a triangle.
@@ -85,16 +86,17 @@ pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeti
 pub(super) fn volumes(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 3] {
     let [a, b, c] = triangle.map(wide);
     let (o, d) = (wide(line.origin), wide(line.direction));
-    let (ra, rb, rc) = (a - o, b - o, c - o);
-    let edge = |p: DVec3, q: DVec3, pq: DVec3| d.dot((p + q).cross(pq));
-    [edge(rc, ra, a - c), edge(ra, rb, b - a), edge(rb, rc, c - b)]
+    let (ra, rb, rc) = (minus(a, o), minus(b, o), minus(c, o));
+    let edge = |p: DVec3, q: DVec3, pq: DVec3| dot(d, cross(p + q, pq));
+    [edge(rc, ra, minus(a, c)), edge(ra, rb, minus(b, a)), edge(rb, rc, minus(c, b))]
 }
 
 /// What they may be off.
 pub(super) fn volume_error(line: &Line, triangle: [[f32; 3]; 3]) -> f64 {
     let [a, b, c] = triangle.map(wide);
-    let [ra, rb, rc] = [a, b, c].map(|p| sum_abs(p - wide(line.origin)));
-    let side = sum_abs(b - a).max(sum_abs(c - b)).max(sum_abs(a - c));
+    let length = |p, q| sum_abs(minus(p, q));
+    let [ra, rb, rc] = [a, b, c].map(|p| length(p, wide(line.origin)));
+    let side = length(b, a).max(length(c, b)).max(length(a, c));
     let reach = ra.max(rb).max(rc);
     gamma(10) * sum_abs(wide(line.direction)) * 2.0 * reach * side
 }
@@ -124,7 +126,9 @@ pub(crate) fn weights(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 2] {
     if along == 0.0 { [0.0; 2] } else { weights }
 }
 
-#[inline(always)]
+/// In line where room is no matter.
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
 fn plane_meeting(line: &Line, triangle: [[f32; 3]; 3]) -> PlaneMeeting<f64> {
     let wide = |p: [f32; 3]| p.map(f64::from);
     PlaneMeeting::new(wide(line.origin), wide(line.direction), triangle.map(wide))
@@ -148,7 +152,7 @@ pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Triang
 }
 
 /// The meeting with the plane, without error.
-fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
+pub(crate) fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
     let (t, t_error) = distance.approximate();
     // None of the volumes is of the other sign.

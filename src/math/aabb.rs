@@ -1,7 +1,5 @@
 //! Axis-aligned boxes.
 
-use glam::DVec3;
-
 /// A closed box; empty when a lower coordinate is above its upper one.
 ///
 /// ```text
@@ -54,15 +52,4 @@ impl Aabb {
         let corners = self.lower.into_iter().chain(self.upper);
         if self.lower[0] > self.upper[0] { 0.0 } else { corners.fold(0.0, |m, x| x.abs().max(m)) }
     }
-}
-
-/// Three `f32` as three `f64`: exact.
-pub(crate) fn wide(p: [f32; 3]) -> DVec3 {
-    DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
-}
-
-/// `|x| + |y| + |z|`.
-pub(crate) fn sum_abs(v: DVec3) -> f64 {
-    let v = v.abs();
-    v.x + v.y + v.z
 }

@@ -80,26 +80,19 @@ impl<const WORDS: usize> Integer<WORDS> {
 
     /// The number times `2^by`.
     fn moved(&self, by: u32) -> Self {
-        let (place, by) = (by as usize / 64, by % 64);
         let mut words = [0; WORDS];
-        let mut carry = 0;
-        // One word beyond those in use takes the last carry.
-        for (word, x) in words.iter_mut().skip(place).zip(self.used().iter().chain([&0])) {
-            let wide = u128::from(*x) << by;
-            *word = wide as u64 | carry;
-            carry = (wide >> 64) as u64;
-        }
-        Self::trimmed(words, place + self.length + 1, self.negative)
+        shift(self.used(), by, &mut words);
+        Self::trimmed(words, by as usize / 64 + self.length + 1, self.negative)
     }
 
     fn used(&self) -> &[u64] {
-        &self.words[..self.length]
+        self.words.get(..self.length).unwrap_or(&self.words)
     }
 
     /// The number of these words, of which the first `most` may not be zero.
     fn trimmed(words: [u64; WORDS], most: usize, negative: bool) -> Self {
-        let highest = words.iter().take(most).rposition(|word| *word != 0);
-        Integer { words, length: highest.map_or(0, |place| place + 1), negative }
+        let length = length(&words, most);
+        Integer { words, length, negative }
     }
 
     /// `self` plus the size of `other` with the sign `negative`.
@@ -114,33 +107,85 @@ impl<const WORDS: usize> Integer<WORDS> {
     }
 
     fn compare_sizes(&self, other: &Self) -> Ordering {
-        let by_length = self.length.cmp(&other.length);
-        by_length.then_with(|| self.used().iter().rev().cmp(other.used().iter().rev()))
+        compare(self.used(), other.used())
     }
 
     /// The sum of both sizes, with the sign of `self`.
     fn joined(&self, other: &Self) -> Self {
         let mut words = [0; WORDS];
         let most = self.length.max(other.length) + 1;
-        let mut carry = false;
-        for ((word, x), y) in words.iter_mut().zip(&self.words).zip(&other.words).take(most) {
-            let (sum, over) = x.overflowing_add(*y);
-            let (sum, over_again) = sum.overflowing_add(u64::from(carry));
-            (*word, carry) = (sum, over | over_again);
-        }
+        add(&self.words, &other.words, most, &mut words);
         Self::trimmed(words, most, self.negative)
     }
 
     /// The size of `self` less that of `other`, which is not larger.
     fn reduced(&self, other: &Self, negative: bool) -> Self {
         let mut words = [0; WORDS];
-        let mut borrow = false;
-        for ((word, x), y) in words.iter_mut().zip(self.used()).zip(&other.words) {
-            let (rest, under) = x.overflowing_sub(*y);
-            let (rest, under_again) = rest.overflowing_sub(u64::from(borrow));
-            (*word, borrow) = (rest, under | under_again);
-        }
+        subtract(self.used(), &other.words, &mut words);
         Self::trimmed(words, self.length, negative)
+    }
+}
+
+// What follows is the same code for numbers of any length. `out` is zero before.
+
+/// The words in use of `words`, of which no more than `most` are.
+fn length(words: &[u64], most: usize) -> usize {
+    let highest = words.iter().take(most).rposition(|word| *word != 0);
+    highest.map_or(0, |place| place + 1)
+}
+
+/// `x * 2^by`.
+fn shift(x: &[u64], by: u32, out: &mut [u64]) {
+    let (place, by) = (by as usize / 64, by % 64);
+    let mut carry = 0;
+    // One word beyond those in use takes the last carry.
+    for (word, x) in out.iter_mut().skip(place).zip(x.iter().chain([&0])) {
+        let wide = u128::from(*x) << by;
+        *word = wide as u64 | carry;
+        carry = (wide >> 64) as u64;
+    }
+}
+
+fn compare(x: &[u64], y: &[u64]) -> Ordering {
+    x.len().cmp(&y.len()).then_with(|| x.iter().rev().cmp(y.iter().rev()))
+}
+
+/// `x + y`, which has no more words than `most`.
+fn add(x: &[u64], y: &[u64], most: usize, out: &mut [u64]) {
+    let mut carry = false;
+    for ((word, x), y) in out.iter_mut().zip(x).zip(y).take(most) {
+        let (sum, over) = x.overflowing_add(*y);
+        let (sum, over_again) = sum.overflowing_add(u64::from(carry));
+        (*word, carry) = (sum, over | over_again);
+    }
+}
+
+/// `x - y`, which is not negative; `y` has as many words as `x` or more.
+fn subtract(x: &[u64], y: &[u64], out: &mut [u64]) {
+    let mut borrow = false;
+    for ((word, x), y) in out.iter_mut().zip(x).zip(y) {
+        let (rest, under) = x.overflowing_sub(*y);
+        let (rest, under_again) = rest.overflowing_sub(u64::from(borrow));
+        (*word, borrow) = (rest, under | under_again);
+    }
+}
+
+/// `x * y`.
+fn multiply(x: &[u64], y: &[u64], out: &mut [u64]) {
+    for (i, x) in x.iter().enumerate() {
+        // Far exponents leave many words empty.
+        if *x == 0 {
+            continue;
+        }
+        let mut carry = 0;
+        for (place, y) in out.iter_mut().skip(i).zip(y) {
+            let sum = u128::from(*x) * u128::from(*y) + u128::from(*place) + u128::from(carry);
+            *place = sum as u64;
+            carry = (sum >> 64) as u64;
+        }
+        if let Some(place) = out.get_mut(i + y.len()) {
+            *place = carry;
+        }
     }
 }
 
@@ -169,21 +214,7 @@ impl<const WORDS: usize> Mul for Integer<WORDS> {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         let mut words = [0; WORDS];
-        for (i, x) in self.used().iter().enumerate() {
-            // Far exponents leave many words empty.
-            if *x == 0 {
-                continue;
-            }
-            let mut carry = 0;
-            for (place, y) in words[i..].iter_mut().zip(other.used()) {
-                let sum = u128::from(*x) * u128::from(*y) + u128::from(*place) + u128::from(carry);
-                *place = sum as u64;
-                carry = (sum >> 64) as u64;
-            }
-            if let Some(place) = words.get_mut(i + other.length) {
-                *place = carry;
-            }
-        }
+        multiply(self.used(), other.used(), &mut words);
         let most = self.length + other.length;
         Self::trimmed(words, most, self.negative != other.negative)
     }

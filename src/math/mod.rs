@@ -7,6 +7,8 @@ pub(crate) mod error_free;
 pub(crate) mod float;
 pub(crate) mod integer;
 pub(crate) mod rounding;
+pub(crate) mod wide;
 
-pub(crate) use aabb::{Aabb, sum_abs, wide};
+pub(crate) use aabb::Aabb;
 pub(crate) use bits::Bits;
+pub(crate) use wide::{sum_abs, wide};

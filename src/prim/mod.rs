@@ -21,6 +21,7 @@ use crate::block::Block;
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock,
 };
+use crate::kinds::SPHERES;
 use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
@@ -133,7 +134,7 @@ impl Leaves<'_> {
         if kind == KIND_TRIANGLES {
             let Some(block) = self.triangle_blocks.get(number) else { return false };
             self.triangles(s, block, number, lanes & block.lanes(), ray, query)
-        } else if kind == KIND_SPHERES {
+        } else if kind == KIND_SPHERES && (SPHERES || Q::OF_INDEX) {
             let Some(block) = self.sphere_blocks.get(number) else { return false };
             self.spheres(block, number, lanes & block.lanes(), ray, query)
         } else {
@@ -141,6 +142,7 @@ impl Leaves<'_> {
         }
     }
 
+    /// Offers `query` what the ray meets among some lanes of a block; out of line for a backend that shall be small.
     #[inline(always)]
     fn triangles<S: Simd, Q: Query>(
         &self,
@@ -151,31 +153,9 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
-        query.watch().block(lanes.count_ones());
-        let t_bound = query.t_bound();
-        let found = if Q::ANY_BOXES {
-            sieve::triangles::<S, true>(s, ray, t_bound, block, lanes)
-        } else {
-            sieve::triangles::<S, false>(s, ray, t_bound, block, lanes)
-        };
-        if found.candidates == 0 {
-            return false;
-        }
-        let number = number as u32;
-        // Neither `t` nor order matters to those that want any hit.
-        let inside = if Q::ORDERED { 0 } else { found.inside(s, ray) };
-        let alone = found.candidates.is_power_of_two();
-        if alone || inside != 0 {
-            let lane = if inside == 0 { found.candidates } else { inside }.trailing_zeros();
-            let certain = Certain { sure: found.sure >> lane & 1 == 1, inside: inside != 0 };
-            let ended = consider(block, number, lane, certain, ray, query);
-            if ended || alone {
-                return ended;
-            }
-        }
-        s.run(Several { block, number, t_bound, found: found.stored(), ray, query })
+        let look = Look { block, number, lanes, ray, query };
+        if S::SMALL { s.run(look) } else { look.run(s) }
     }
-
     #[inline(never)]
     fn spheres<Q: Query>(
         &self,
@@ -199,6 +179,47 @@ impl Leaves<'_> {
                 query.sphere(ray, &SphereLane { centre, radius, place, detail })
             })
         })
+    }
+}
+
+/// The first look at the triangles of a block.
+struct Look<'a, Q> {
+    block: &'a TriangleBlock,
+    number: usize,
+    lanes: u32,
+    ray: &'a PreparedRay,
+    query: &'a mut Q,
+}
+
+impl<Q: Query> Kernel for Look<'_, Q> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> bool {
+        let Look { block, number, lanes, ray, query } = self;
+        query.watch().block(lanes.count_ones());
+        let t_bound = query.t_bound();
+        let found = if Q::ANY_BOXES {
+            sieve::triangles::<S, true>(s, ray, t_bound, block, lanes)
+        } else {
+            sieve::triangles::<S, false>(s, ray, t_bound, block, lanes)
+        };
+        if found.candidates == 0 {
+            return false;
+        }
+        let number = number as u32;
+        // Neither `t` nor order matters to those that want any hit.
+        let inside = if Q::ORDERED { 0 } else { found.inside(s, ray) };
+        let alone = found.candidates.is_power_of_two();
+        if alone || inside != 0 {
+            let lane = if inside == 0 { found.candidates } else { inside }.trailing_zeros();
+            let certain = Certain { sure: found.sure >> lane & 1 == 1, inside: inside != 0 };
+            let ended = consider(block, number, lane, certain, ray, query);
+            if ended || alone {
+                return ended;
+            }
+        }
+        s.run(Several { block, number, t_bound, found: found.stored(), ray, query })
     }
 }
 
@@ -229,14 +250,15 @@ impl<Q: Query> Kernel for Several<'_, Q> {
         }
         let mut rest = candidates;
         while rest != 0 {
-            let lane = found.nearest(s, rest);
+            // The order matters to no answer.
+            let lane = if S::SMALL { rest.trailing_zeros() } else { found.nearest(s, rest) };
             rest &= !(1 << lane);
             let certain = Certain { sure: sure >> lane & 1 == 1, inside: false };
             if consider(block, number, lane, certain, ray, query) {
                 return true;
             }
             // What was found in a lane may be nearer than others.
-            if rest != 0 && query.t_bound() < t_bound {
+            if !S::SMALL && rest != 0 && query.t_bound() < t_bound {
                 rest &= found.up_to(s, ray, query.t_bound());
             }
         }

@@ -346,7 +346,8 @@ impl Decide for Exact {
 #[inline(never)]
 fn unclear(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
     match lane.sure {
-        true => triangle::plane(&ray.line(), lane.corners()),
+        // The plane was not clear.
+        true => triangle::exact_plane(&ray.line(), lane.corners()),
         false => triangle::meet(&ray.line(), lane.corners()),
     }
 }

@@ -1,7 +1,7 @@
 //! A ray in a frame of its own, in which `f32` neither over- nor underflows.
 
-use super::Ray;
 use super::slab::{NarrowSlab, Scales};
+use super::{Axis, Ray};
 use crate::exact::Line;
 use crate::math::float::{narrow_power_of_two, power_of_two};
 use crate::math::rounding::{UNIT32, f32_above, f32_below};
@@ -37,7 +37,7 @@ pub(crate) struct PreparedRay {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shear {
     /// The axes x, y and depth of the sheared space, an even permutation.
-    pub axes: [usize; 3],
+    pub axes: [Axis; 3],
     /// The direction's x and y for each unit of depth: at most 1 in size, but for rounding.
     pub slope: [f32; 2],
     /// What x and y of a sheared vertex may be off for each unit of depth, whatever they are.
@@ -178,7 +178,11 @@ impl Ray {
         let (distance, speed) = (o.abs(), d.abs());
         let fastest = s.largest_of_three(speed);
         let inverse = splat(1.0).div(speed.max(fastest.mul(splat(SLOWEST))));
-        let depth = 31 - (fastest.less_or_equal(speed) & 7 | 1).leading_zeros();
+        let depth = match fastest.less_or_equal(speed) & 7 {
+            4.. => Axis::Z,
+            2.. => Axis::Y,
+            _ => Axis::X,
+        };
         let [fastest, ..] = array::<S>(fastest);
         let [farthest, ..] = array::<S>(s.largest_of_three(distance));
         let reach = if farthest > reach { farthest } else { reach };
@@ -204,10 +208,20 @@ impl Ray {
             scales,
             t_min: t_min_below,
             t_max: t_max_above,
-            depth: depth as usize % 3,
+            depth,
             prepared: None,
         };
         Some((ray, slab))
+    }
+
+    /// The same out of line, for a backend that shall be small.
+    #[inline(never)]
+    pub(crate) fn set_out_apart<S: Simd>(
+        &self,
+        s: S,
+        reach: f32,
+    ) -> Option<(LateRay<S>, NarrowSlab)> {
+        self.set_out(s, reach)
     }
 
     /// The same with all that traversal needs.
@@ -273,7 +287,7 @@ pub(crate) struct LateRay<S: Simd> {
     scales: Scales,
     t_min: f32,
     pub t_max: f32,
-    depth: usize,
+    depth: Axis,
     prepared: Option<PreparedRay>,
 }
 
@@ -332,9 +346,13 @@ impl Late for PreparedRay {
 }
 
 /// The axis of the largest component, the last of equal ones.
-fn depth_axis([x, y, z, _]: [f32; 4]) -> usize {
+fn depth_axis([x, y, z, _]: [f32; 4]) -> Axis {
     let [x, y, z] = [x, y, z].map(f32::abs);
-    if z >= x && z >= y { 2 } else { usize::from(y >= x) }
+    match (z >= x && z >= y, y >= x) {
+        (true, _) => Axis::Z,
+        (false, true) => Axis::Y,
+        (false, false) => Axis::X,
+    }
 }
 
 /// The lanes of a vector.
@@ -345,16 +363,14 @@ fn array<S: Simd>(v: <S as Width<4>>::V) -> [f32; 4] {
     lanes
 }
 
-/// The axes x, y and depth, for each depth.
-const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
-
 impl Shear {
     #[inline(always)]
-    fn new(depth: usize, origin: &[f32; 4], direction: &[f32; 4], scale: f32, t_min: f32) -> Self {
-        let axes = const { &AXES }[depth];
+    fn new(depth: Axis, origin: &[f32; 4], direction: &[f32; 4], scale: f32, t_min: f32) -> Self {
+        let axes = depth.as_depth();
+        let [kx, ky, depth] = axes.map(|axis| axis as usize);
         let depth_rate = direction[depth].abs();
         let inverse = 1.0 / depth_rate;
-        let slope = [direction[axes[0]] * inverse, direction[axes[1]] * inverse];
+        let slope = [direction[kx] * inverse, direction[ky] * inverse];
         let [a, b] = [slope[0].abs(), slope[1].abs()];
         let sign = direction[depth].to_bits() & 1 << 31;
         let signed = |x: f32| f32::from_bits(x.to_bits() ^ sign);
@@ -382,7 +398,7 @@ impl PreparedRay {
         t_min: 0.0,
         t_max: 0.0,
         shear: Shear {
-            axes: AXES[2],
+            axes: [Axis::X, Axis::Y, Axis::Z],
             slope: [0.0; 2],
             blur: 0.0,
             depth_scale: 0.0,
@@ -491,7 +507,11 @@ mod tests {
             ([2.0, 2.0, 2.0], [0, 1, 2], 1.0),
         ] {
             let shear = Ray::new([0.0; 3], direction).prepare(1.0).expect("a ray").shear;
-            assert_eq!((shear.axes, shear.depth_scale.signum()), (axes, sign), "{direction:?}");
+            assert_eq!(
+                (shear.axes.map(|axis| axis as usize), shear.depth_scale.signum()),
+                (axes, sign),
+                "{direction:?}"
+            );
             assert!(shear.blur <= 6.0 * UNIT32 && (1.0..2.0).contains(&shear.depth_rate));
         }
     }

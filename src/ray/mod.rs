@@ -2,6 +2,7 @@
 
 mod abreast;
 mod alike;
+mod axis;
 #[cfg(test)]
 mod bounds;
 mod frame;
@@ -10,6 +11,7 @@ mod slab;
 
 pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
+pub(crate) use axis::Axis;
 pub(crate) use frame::{Late, PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, RayPacket, Spread};
 pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};

@@ -27,7 +27,8 @@ impl<V: Copy> Along<V> {
         V: Lanes<N>,
     {
         let shear = &ray.shear;
-        let raw = s.load(&vertices[shear.axes[2]]).mul(s.splat(shear.depth_scale));
+        let [.., depth] = shear.axes;
+        let raw = s.load(&vertices[depth as usize]).mul(s.splat(shear.depth_scale));
         Along { raw, depth: raw.sub(s.splat(shear.origin_depth)) }
     }
 }
@@ -54,6 +55,7 @@ impl<V: Copy> Across<V> {
         V: Lanes<N>,
     {
         let [kx, ky, _] = ray.shear.axes;
+        let (kx, ky) = (kx as usize, ky as usize);
         let [slope_x, slope_y] = ray.shear.slope;
         let scale = s.splat(ray.scale);
         let (from_x, from_y) = (s.splat(ray.origin[kx]), s.splat(ray.origin[ky]));

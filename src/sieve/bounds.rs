@@ -131,7 +131,7 @@ fn see_triangle(
     worst: &mut TriangleWorst,
 ) {
     let given = &ray.given;
-    let [kx, ky, kz] = ray.shear.axes;
+    let [kx, ky, kz] = ray.shear.axes.map(|axis| axis as usize);
     let scale = f64::from(ray.scale);
     let d = wide(given.direction);
     let real = corners.map(|v| {

@@ -88,7 +88,7 @@ impl Middle<[f32; 1]> {
     #[inline(always)]
     pub fn of_one(ray: &PreparedRay, aabb: &Aabb) -> Self {
         let shear = &ray.shear;
-        Middle::of(Scalar, (shear.axes[2], shear.depth_scale), [shear.origin_depth], aabb)
+        Middle::of(Scalar, (shear.axes[2] as usize, shear.depth_scale), [shear.origin_depth], aabb)
     }
 }
 
@@ -189,6 +189,10 @@ impl<const N: usize> Meetings<[f32; N]> {
             rise: s.load(&self.rise),
             error: s.load(&self.error),
         }
+    }
+
+    pub fn one(&self, lane: usize) -> Meetings<[f32; 1]> {
+        Meetings { total: [self.total[lane]], rise: [self.rise[lane]], error: [self.error[lane]] }
     }
 
     pub fn set(&mut self, lane: usize, one: &Meetings<[f32; 1]>) {

@@ -26,7 +26,23 @@ impl<V: Lanes<16>> Triangles<V> {
     pub fn inside<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay) -> u32 {
         let [low, high] = ray.inner_depths();
         let window = self.middle.inner_window(Scalar, [[low], [high]]);
+        if S::SMALL {
+            return self.inside_one_by_one(window);
+        }
         self.sure & self.meetings.inside::<S, true, 16>(s, splat(s, window))
+    }
+
+    #[inline(never)]
+    fn inside_one_by_one(&self, window: [[f32; 1]; 2]) -> u32 {
+        let meetings = self.meetings.stored();
+        let (mut rest, mut inside) = (self.sure, 0);
+        while rest != 0 {
+            let lane = rest.trailing_zeros();
+            rest &= rest - 1;
+            let one = meetings.one(lane as usize % 16);
+            inside |= one.inside::<_, false, 1>(Scalar, window) << lane;
+        }
+        inside
     }
 
     /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
@@ -80,7 +96,7 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     let middle = Middle::of_one(ray, &block.aabb);
     let window = middle.window(Scalar, limits(ray, t_bound));
     let lanes = if middle.is_beyond(Scalar, window) == 0 { lanes } else { 0 };
-    if S::FEW > 0 && lanes.count_ones() <= S::FEW {
+    if S::SMALL || S::FEW > 0 && lanes.count_ones() <= S::FEW {
         return few(ray, middle, window, block, lanes).loaded(s);
     }
     let along = Along::new(s, ray, &block.vertices);

@@ -180,6 +180,9 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// So few lanes of 16 are faster one by one.
     const FEW: u32;
 
+    /// Whether code had better be small than fast: where there are no vectors, lanes go one by one and by calls.
+    const SMALL: bool = false;
+
     /// Whether batches trace rays together and keep several in flight: where vectors are fast enough to wait for memory. Elsewhere it
     /// would only be one more copy of the code.
     const FLIES: bool = false;
@@ -307,6 +310,9 @@ impl Backend {
 
     /// What queries use now.
     pub fn current() -> Backend {
+        if !CHOOSES {
+            return Backend::detected();
+        }
         match CHOICE.load(Ordering::Relaxed) {
             1 => Backend::Scalar,
             2 => Backend::Bits128,
@@ -321,15 +327,18 @@ impl Backend {
     }
 
     /// Lets queries of the whole process use this backend, or the best there is if it is less. For
-    /// tests and measurements: all backends give the same bits.
+    /// tests and measurements: all backends give the same bits. Without std, only on x86-64.
     pub fn force(self) -> Backend {
         let choice = self.min(Backend::detected());
         CHOICE.store(choice as u8, Ordering::Relaxed);
-        choice
+        Backend::current()
     }
 }
 
-/// The one global of the library: asking the processor takes longer than a ray.
+/// Whether there is anything to choose at run time: a microcontroller has no memory for what is known before.
+const CHOOSES: bool = cfg!(any(target_arch = "x86_64", feature = "std"));
+
+/// The one global of the library, where it [chooses](CHOOSES): asking the processor takes longer than a ray.
 static CHOICE: AtomicU8 = AtomicU8::new(0);
 
 /// Something to run with a backend. Not a closure: `run`, and all that it calls, must be inlined always,

@@ -8,12 +8,16 @@ use super::{Kernel, Lanes, Simd, Width, corner};
 #[derive(Clone, Copy)]
 pub(crate) struct Scalar;
 
-fn zip<const N: usize>(a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> f32) -> [f32; N] {
-    core::array::from_fn(|i| f(a[i], b[i]))
+fn zip<const N: usize>(mut a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> f32) -> [f32; N] {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = f(*a, b);
+    }
+    a
 }
 
 fn mask<const N: usize>(a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> bool) -> u32 {
-    (0..N).fold(0, |bits, i| bits | u32::from(f(a[i], b[i])) << i)
+    let lanes = a.into_iter().zip(b).enumerate();
+    lanes.fold(0, |bits, (i, (a, b))| bits | u32::from(f(a, b)) << i)
 }
 
 /// Writes those of `values` that `mask` names to the front of `out`.
@@ -219,6 +223,9 @@ impl<const N: usize> Width<N> for Scalar {
 
 impl Simd for Scalar {
     const FEW: u32 = 8;
+
+    /// Not where compilers make vectors of this code.
+    const SMALL: bool = !cfg!(any(target_feature = "sse2", target_feature = "neon"));
 
     doubles_one_by_one!();
 
