@@ -57,6 +57,17 @@ fn text(path: &Path) -> &str {
 
 /// Compiles `source` with `flags`, links it and runs it; returns what it printed.
 fn program(name: &str, source: &str, cpp: bool, flags: &[&str]) -> String {
+    program_with(name, source, cpp, flags, &[])
+}
+
+/// The same with other libraries.
+fn program_with(
+    name: &str,
+    source: &str,
+    cpp: bool,
+    flags: &[&str],
+    libraries: &[&str],
+) -> String {
     let library = library().join("libraykern.a");
     let binary = target().join(name);
     let mut command = compiler(cpp);
@@ -66,7 +77,7 @@ fn program(name: &str, source: &str, cpp: bool, flags: &[&str]) -> String {
     }
     let language = if cpp { "c++" } else { "c" };
     command.args(["-x", language]).arg(root().join(source)).args(["-x", "none"]);
-    run(command.arg(library).args(SYSTEM).arg("-o").arg(&binary));
+    run(command.arg(library).args(libraries).args(SYSTEM).arg("-o").arg(&binary));
     // Memory of the programs is never freed.
     run(Command::new(binary).env("ASAN_OPTIONS", "detect_leaks=0"))
 }
@@ -121,6 +132,17 @@ fn closest() {
 #[test]
 fn instances() {
     program("instances", "c_tests/instances.c", false, &["-std=c11"]);
+}
+
+/// Where Embree 3 is installed.
+#[test]
+fn instances_against_embree() {
+    if !Path::new("/usr/include/embree3/rtcore.h").exists() {
+        println!("skipped: no Embree 3");
+        return;
+    }
+    let source = "c_tests/instances_embree.c";
+    program_with("instances_embree", source, false, &["-std=c11"], &["-lembree3"]);
 }
 
 #[test]

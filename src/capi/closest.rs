@@ -21,7 +21,7 @@ use crate::ray::NONE;
 ///
 /// In instances they are those of the images of vertices, rounded to double precision, and of the ellipsoids that spheres
 /// become; if a map stretches by at most 2^10 times as much along one axis as along another, within 2^-40 of
-/// the distance and the longest axis. Takes time in proportion to the number of instances.
+/// the distance and the longest axis.
 ///
 /// Nothing is within a radius that is negative or NaN, from a point that is not finite, or beyond FLT_MAX.
 ///
