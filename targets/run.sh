@@ -66,9 +66,9 @@ library() {
 
 # agree TARGET KIND FLAGS: where the crate `agree` is.
 agree() {
-    local folder=$work/agree
+    local folder=$work/agree flags=${3:-}
     CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path agree/Cargo.toml --release \
-        --target "$1" --crate-type "$2" -- ${3//,/ } >&2
+        --target "$1" --crate-type "$2" -- ${flags//,/ } >&2
     echo "$folder/$1/release"
 }
 
@@ -163,6 +163,12 @@ arm() { # Rust target, flags, machine
     read -r -a flags <<<"-mthumb ${2//,/ } -DTICK=$tick"
     emulator=(qemu-system-arm -M "$3")
     board arm-none-eabi- "$1" cortex_m
+    # No circle of calls, and the deepest chain whether it was taken or not. The M0 has frames that are not told from constants.
+    install python3 python3
+    local chain
+    chain=$(python3 calls.py arm-none-eabi-objdump "$work/$name-picture.elf" rt_accel_open rt_intersect rt_occluded \
+        2>"$work/chain.txt") || { cat "$work/chain.txt" >&2; return 1; }
+    [ "$name" = m0 ] || cost picture-chain "$chain"
 }
 
 riscv() {

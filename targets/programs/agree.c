@@ -8,7 +8,7 @@
 size_t agree_room(void);
 uint32_t agree(void *room, uint32_t rays);
 
-static unsigned char room[600000] __attribute__((aligned(64)));
+static unsigned char room[2200000] __attribute__((aligned(64)));
 
 int main(void) {
     if (agree_room() > sizeof room) return 1;

@@ -63,9 +63,7 @@ impl Shown<'_> {
         let normal = self.normal(&hit);
         let facing = if dot(normal, ray.direction) < 0.0 { 1.0 } else { -1.0 };
         // A little off the surface.
-        let point = |k: usize| {
-            ray.origin[k] + hit.t * ray.direction[k] + 1e-4 * facing * normal[k]
-        };
+        let point = |k: usize| ray.origin[k] + hit.t * ray.direction[k] + 1e-4 * facing * normal[k];
         let from = [point(0), point(1), point(2)];
         let to_light = [0, 1, 2].map(|k| camera.light[k] - from[k]);
         let length = libm::sqrtf(dot(to_light, to_light));

@@ -13,10 +13,14 @@ use raykern::{
 #[repr(C, align(64))]
 pub struct Room {
     made: Made,
-    blocks: [[MaybeUninit<u8>; BLOCK]; 2],
+    blocks: [Block; 2],
 }
 
-const BLOCK: usize = 1 << 18;
+/// Blocks begin at multiples of 64 bytes.
+#[repr(align(64))]
+struct Block([MaybeUninit<u8>; BLOCK]);
+
+const BLOCK: usize = 1 << 20;
 
 impl Room {
     /// The number, from `count` rays a scene; 1 if a build failed, 2 or more if structures answer differently. The room is
@@ -24,21 +28,21 @@ impl Room {
     pub fn agree(&mut self, count: u32) -> u32 {
         match answers(self, count) {
             Ok(hash) => hash,
-            Err(Wrong::Build(_)) => 1,
+            Err(Wrong::Build) => 1,
             Err(Wrong::Answer(structure)) => 2 + structure,
         }
     }
 }
 
 enum Wrong {
-    Build(BuildError),
+    Build,
     /// This structure answers differently than a list.
     Answer(u32),
 }
 
 impl From<BuildError> for Wrong {
-    fn from(error: BuildError) -> Wrong {
-        Wrong::Build(error)
+    fn from(_: BuildError) -> Wrong {
+        Wrong::Build
     }
 }
 
@@ -79,7 +83,7 @@ fn build<'m>(
 }
 
 fn answers(room: &mut Room, count: u32) -> Result<u32, Wrong> {
-    let Room { made, blocks: [child, block] } = room;
+    let Room { made, blocks: [Block(child), Block(block)] } = room;
     let mut all = Hash::default();
     for shape in 0..SHAPES {
         made.fill(shape);
