@@ -59,7 +59,7 @@ fn main() -> Result<()> {
 
 fn model(path: &Path) -> Result<Model> {
     if path.extension().is_some_and(|ending| ending == "xml") {
-        return Ok(load::load(path)?.model);
+        return load::load(path)?.model.flattened().context("ellipsoids are not baked");
     }
     Ok(load_mesh(path)?.into())
 }

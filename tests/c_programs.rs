@@ -61,13 +61,7 @@ fn program(name: &str, source: &str, cpp: bool, flags: &[&str]) -> String {
 }
 
 /// The same with other libraries.
-fn program_with(
-    name: &str,
-    source: &str,
-    cpp: bool,
-    flags: &[&str],
-    libraries: &[&str],
-) -> String {
+fn program_with(name: &str, source: &str, cpp: bool, flags: &[&str], libraries: &[&str]) -> String {
     let library = library().join("libraykern.a");
     let binary = target().join(name);
     let mut command = compiler(cpp);
