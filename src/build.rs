@@ -358,10 +358,10 @@ impl LevelPlan<'_> {
     /// Builds behind the own primitives, which end at byte `own`; returns the size of the block.
     fn run(&self, options: &BuildOptions, own: usize, bytes: &mut [u8]) -> Option<usize> {
         let LevelPlan { placed, index, .. } = self;
-        write(placed, own, bytes, |rest| {
+        write(placed, own, bytes, |boxes, rest| {
             let room = rest.len().min(index.size);
             let caller = Caller::new(options.threads, None);
-            index.run(&Scene::of_boxes(placed), options, &caller, rest.get_mut(..room)?).ok()
+            index.run(&Scene::of_boxes(boxes), options, &caller, rest.get_mut(..room)?).ok()
         })
     }
 }

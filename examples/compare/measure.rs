@@ -22,8 +22,10 @@ pub struct Measured {
     pub origin: String,
     /// Triangles that are stored: once, however often they are seen.
     pub triangles: usize,
-    /// Spheres.
+    /// Spheres, likewise.
     pub spheres: usize,
+    /// The places where they are seen besides.
+    pub instances: usize,
     /// Width and height.
     pub resolution: [u32; 2],
     /// In the order of the options.
@@ -124,6 +126,7 @@ pub fn scene(subject: &Subject, options: &Options, deadline: Instant) -> Result<
         origin: subject.origin(),
         triangles: scene.model.triangle_count(),
         spheres: scene.model.sphere_count(),
+        instances: scene.model.places.len(),
         resolution: camera.resolution,
         structures,
         compared: (0, 0),

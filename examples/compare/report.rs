@@ -186,12 +186,30 @@ impl Measured {
 fn print_scene(scene: &Measured) {
     let [width, height] = scene.resolution;
     println!(
-        "{} ({}): {} triangles, {} spheres, {width} x {height}",
-        scene.name, scene.origin, scene.triangles, scene.spheres
+        "{} ({}): {} triangles, {} spheres{}, {width} x {height}",
+        scene.name,
+        scene.origin,
+        scene.triangles,
+        scene.spheres,
+        if scene.instances > 0 {
+            format!(", {} instances", scene.instances)
+        } else {
+            String::new()
+        }
     );
     println!(
-        "  {:5} {:>9} {:>8} {:>10} {:>10} {:>22} {:>8} {:>9} {:>8} {:>9}  to bvh (95 %)",
-        "", "build s", "B/prim", "min s", "max s", "mean s", "Mray/s", "steps", "blocks", "tests"
+        "  {:5} {:>9} {:>8} {:>8} {:>10} {:>10} {:>22} {:>8} {:>9} {:>8} {:>9}  to bvh (95 %)",
+        "",
+        "build s",
+        "MB",
+        "B/prim",
+        "min s",
+        "max s",
+        "mean s",
+        "Mray/s",
+        "steps",
+        "blocks",
+        "tests"
     );
     for result in &scene.structures {
         let Some(summary) = result.summary() else { continue };
@@ -204,9 +222,10 @@ fn print_scene(scene: &Measured) {
             other => scene.ratio(other).map(ratio_text).unwrap_or_default(),
         };
         println!(
-            "  {:5} {:>9} {:>8.0} {:>10} {:>10} {:>22} {:>8} {:>9} {:>8} {:>9}  {ratio}",
+            "  {:5} {:>9} {:>8} {:>8.0} {:>10} {:>10} {:>22} {:>8} {:>9} {:>8} {:>9}  {ratio}",
             result.structure.name(),
             digits(least(&result.builds)),
+            digits(result.info.size as f64 * 1e-6),
             bytes_per_prim(scene, result),
             digits(summary.min),
             digits(summary.max),

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use raykern_harness::load::load;
 use raykern_harness::render::RenderScene;
 use raykern_harness::scenes::{self, SceneMaker};
@@ -12,6 +12,8 @@ pub struct Subject {
     /// As in tables and file names.
     pub name: String,
     source: Source,
+    /// Whether what is shown in several places is copied there.
+    flat: bool,
 }
 
 enum Source {
@@ -21,8 +23,9 @@ enum Source {
 
 /// The blog post's scenes, light ones first, and their files under `metu/`.
 ///
-/// The mesh of its dragon_metal was not found; another dragon of a like size stands in.
-const BLOG: [(&str, &str); 8] = [
+/// The mesh of its dragon_metal was not found; another dragon of a like size stands in. The last one is the one before it with a copy
+/// of the dragon at each place, as the post had it.
+const BLOG: [(&str, &str); 9] = [
     ("simple", "simple.xml"),
     ("two_spheres", "two_spheres.xml"),
     ("bunny", "bunny.xml"),
@@ -31,14 +34,22 @@ const BLOG: [(&str, &str); 8] = [
     ("chinese_dragon", "chinese_dragon.xml"),
     ("dragon_metal", "dragon_metal_standin.xml"),
     ("marching_dragons", "marching_dragons.xml"),
+    ("marching_dragons_flat", "marching_dragons.xml"),
 ];
+
+/// A name that ends so means the scene before it, flattened.
+const FLAT: &str = "_flat";
 
 impl Subject {
     /// Loads or makes the scene.
     pub fn load(&self) -> Result<RenderScene> {
-        match &self.source {
-            Source::File(path) => Ok(load(path)?),
-            Source::BuiltIn(make) => Ok(make()),
+        let scene = match &self.source {
+            Source::File(path) => load(path)?,
+            Source::BuiltIn(make) => make(),
+        };
+        match self.flat {
+            true => scene.flattened().context("ellipsoids cannot be flattened"),
+            false => Ok(scene),
         }
     }
 
@@ -60,8 +71,18 @@ pub fn choose(wanted: &[String], folder: Option<&Path>) -> Result<Vec<Subject>> 
     }
     let blog = folder.map(|folder| folder.join("metu")).filter(|metu| metu.is_dir());
     Ok(match blog {
-        Some(metu) => BLOG.iter().map(|(name, file)| from_file(name, metu.join(file))).collect(),
-        None => scenes::ALL.iter().map(|&(name, make)| built_in(name, make)).collect(),
+        Some(metu) => {
+            let subject = |(name, file): &(&str, &str)| {
+                let flat = name.ends_with(FLAT);
+                Subject { flat, ..from_file(name, metu.join(file)) }
+            };
+            BLOG.iter().map(subject).collect()
+        }
+        None => {
+            let flat = format!("{}{FLAT}", scenes::ALL[scenes::ALL.len() - 1].0);
+            let all = scenes::ALL.iter().map(|&(name, make)| built_in(name, make));
+            all.chain([find(&flat, None)?]).collect()
+        }
     })
 }
 
@@ -85,6 +106,10 @@ fn find(text: &str, folder: Option<&Path>) -> Result<Subject> {
     }
     if let Some((name, make)) = scenes::ALL.iter().find(|(name, _)| *name == text) {
         return Ok(built_in(name, *make));
+    }
+    if let Some(name) = text.strip_suffix(FLAT) {
+        let scene = find(name, folder)?;
+        return Ok(Subject { name: text.to_owned(), flat: true, ..scene });
     }
     let collected = folder.map(collected).unwrap_or_default();
     match collected.into_iter().find(|(name, _)| name == text) {
@@ -113,11 +138,11 @@ fn collected(folder: &Path) -> Vec<(String, PathBuf)> {
 }
 
 fn from_file(name: &str, path: PathBuf) -> Subject {
-    Subject { name: name.to_owned(), source: Source::File(path) }
+    Subject { name: name.to_owned(), source: Source::File(path), flat: false }
 }
 
 fn built_in(name: &str, make: SceneMaker) -> Subject {
-    Subject { name: name.to_owned(), source: Source::BuiltIn(make) }
+    Subject { name: name.to_owned(), source: Source::BuiltIn(make), flat: false }
 }
 
 /// The file's name up to the first dot.

@@ -4,12 +4,13 @@
 //! | --- | --- | --- |
 //! | `spheres` | two_spheres | two primitives: neither structure should cost much |
 //! | `ball` | chinese_dragon | one dense mesh, even cells |
-//! | `marching` | marching_dragons | nine dense meshes on a floor 100 times as long |
+//! | `marching` | marching_dragons | nine instances of a dense mesh on a floor 100 times as long |
 //! | `stadium` | a teapot in a stadium | a small dense thing in a large, finely cut hall |
 //! | `glass` | scienceTree_glass | mirrors and glass: rays from inside objects |
 
-use glam::DVec3;
+use glam::{DAffine3, DQuat, DVec3};
 
+use crate::assembly::{Assembly, Place};
 use crate::make::{self, Random};
 use crate::model::{Model, TriangleMesh};
 use crate::render::{Camera, Material, MaterialKind, PointLight, RenderScene};
@@ -49,17 +50,17 @@ pub fn ball() -> RenderScene {
     parts.seen(camera, [800, 800], &[([2.0, 3.5, 5.0], 9_500.0), ([-6.0, 2.0, 1.0], 2_000.0)])
 }
 
-/// Nine knots of 200,000 triangles each on two triangles of floor, 2 wide and 101 long.
+/// A knot of 200,000 triangles nine times on two triangles of floor, 2 wide and 101 long.
 pub fn marching() -> RenderScene {
     let mut parts = Parts::default();
     let floor = [[-1.0, 0.0, 100.0], [1.0, 0.0, 100.0], [1.0, 0.0, -1.0], [-1.0, 0.0, -1.0]];
     parts.mesh(quad(floor), Material::matte([0.8; 3]));
-    let knot = make::knot(200_000);
+    let knot = parts.child(make::knot(200_000));
     for k in 0..9 {
         let (row, column) = (k / 3, k % 3);
         let place = [0.25 * (column as f64 - 1.0), 0.11, -0.25 * row as f64];
         let hue = k as f64 / 9.0;
-        parts.mesh(knot.clone().placed(0.1, place), Material::matte(rainbow(hue)).shiny(0.4, 30.0));
+        parts.place(knot, 0.1, place, Material::matte(rainbow(hue)).shiny(0.4, 30.0));
     }
     let camera = View { eye: [0.0, 0.95, 1.5], target: [0.0, 0.06, -0.27], fov: 22.0 };
     parts.seen(camera, [960, 540], &[([-0.7, 1.6, 1.2], 700.0), ([0.8, 1.4, 0.3], 250.0)])
@@ -126,6 +127,8 @@ pub fn glass() -> RenderScene {
 struct Parts {
     meshes: Vec<(TriangleMesh, Material)>,
     spheres: Vec<([f32; 4], Material)>,
+    children: Vec<Model>,
+    places: Vec<(Place, Material)>,
 }
 
 /// Where the picture is taken from.
@@ -145,6 +148,22 @@ impl Parts {
         self.spheres.push((sphere.map(|x| x as f32), material));
     }
 
+    /// What is shown by [`place`](Self::place) alone.
+    fn child(&mut self, mesh: TriangleMesh) -> usize {
+        self.children.push(mesh.into());
+        self.children.len() - 1
+    }
+
+    fn place(&mut self, child: usize, scale: f64, at: [f64; 3], material: Material) {
+        let map = DAffine3::from_scale_rotation_translation(
+            DVec3::splat(scale),
+            DQuat::IDENTITY,
+            DVec3::from(at),
+        );
+        let place = Place::new(child, &map).expect("a scale that is not zero");
+        self.places.push((place, material));
+    }
+
     fn seen(self, view: View, size: [u32; 2], lights: &[([f64; 3], f64)]) -> RenderScene {
         self.seen_with(view, DVec3::Y, size, lights)
     }
@@ -159,13 +178,19 @@ impl Parts {
         let (meshes, mut materials): (Vec<_>, Vec<_>) = self.meshes.into_iter().unzip();
         let (spheres, more): (Vec<_>, Vec<_>) = self.spheres.into_iter().unzip();
         materials.extend(more);
+        let geometries = materials.len();
+        let (places, more): (Vec<_>, Vec<_>) = self.places.into_iter().unzip();
+        materials.extend(more);
         let [eye, target] = [view.eye, view.target].map(DVec3::from);
         let camera = Camera::look_at(eye, target, up, view.fov, 1.0, size);
         RenderScene {
-            model: Model { meshes, sphere_sets: spheres.into_iter().map(|s| vec![s]).collect() }
-                .into(),
-            geometry_material: (0..materials.len()).collect(),
-            place_material: Vec::new(),
+            model: Assembly {
+                own: Model { meshes, sphere_sets: spheres.into_iter().map(|s| vec![s]).collect() },
+                children: self.children,
+                places,
+            },
+            geometry_material: (0..geometries).collect(),
+            place_material: (geometries..materials.len()).collect(),
             materials,
             lights: lights
                 .iter()
@@ -208,7 +233,9 @@ mod tests {
             let own = &scene.model.own;
             let geometries = own.meshes.len() + own.sphere_sets.len();
             assert_eq!(scene.geometry_material.len(), geometries, "{name}");
-            assert!(scene.geometry_material.iter().all(|&m| m < scene.materials.len()), "{name}");
+            assert_eq!(scene.place_material.len(), scene.model.places.len(), "{name}");
+            let mut numbers = scene.geometry_material.iter().chain(&scene.place_material);
+            assert!(numbers.all(|&m| m < scene.materials.len()), "{name}");
             assert!(by_name(name).is_some());
         }
         assert!(by_name("no such scene").is_none());

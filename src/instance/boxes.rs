@@ -66,6 +66,11 @@ impl<'s> Placed<'s> {
         Ok(Placing { map, mask: instance.mask, child, contents })
     }
 
+    /// The bytes of the block that instance `i` shows.
+    pub fn child(&self, i: usize) -> Option<*const u8> {
+        self.scene.instance(i).map(|instance| instance.child.bytes().as_ptr())
+    }
+
     /// Instance `i`.
     pub fn get(&self, i: usize) -> Option<Placing> {
         self.check(i).ok()

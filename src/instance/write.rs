@@ -3,6 +3,7 @@
 use super::boxes::{Placed, Placing};
 use crate::block::level::{InstanceRecord, LevelHead, LevelMut, LevelOffsets};
 use crate::block::seal_level;
+use crate::math::Aabb;
 use crate::scene::Boxes;
 
 /// The bytes that head, records and children take at most.
@@ -11,13 +12,13 @@ pub(crate) fn fixed_size(instances: usize) -> Option<usize> {
 }
 
 /// Writes what belongs to the instances behind the own primitives, which end at byte `own`: records and children, and the
-/// index by `build_index`, which returns its size. Returns the size of the whole block. `None` when it does not fit, or when
-/// `build_index` fails.
+/// index by `build_index` over the boxes of these, which returns its size. Returns the size of the whole block. `None` when it
+/// does not fit, or when `build_index` fails.
 pub(crate) fn write(
     placed: &Placed,
     own: usize,
     bytes: &mut [u8],
-    build_index: impl FnOnce(&mut [u8]) -> Option<usize>,
+    build_index: impl FnOnce(&Recorded, &mut [u8]) -> Option<usize>,
 ) -> Option<usize> {
     let instances = placed.count();
     // Until it is known how many are the same there is a child for each.
@@ -49,16 +50,29 @@ pub(crate) fn write(
         };
     }
     rest.fill(0);
-    let size = at.index + build_index(rest)?;
+    let size = at.index + build_index(&Recorded(records), rest)?;
     zero_gaps(&at, instances, child_count, bytes)?;
     seal_level(bytes, size)?;
     Some(size)
 }
 
+/// Boxes that stand in records: those of maps take a while to compute, and a builder asks for each several times.
+pub(crate) struct Recorded<'b>(&'b [InstanceRecord]);
+
+impl Boxes for Recorded<'_> {
+    fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    fn aabb(&self, i: usize) -> Aabb {
+        self.0.get(i).map_or(Aabb::EMPTY, |record| record.bounds)
+    }
+}
+
 /// Writes the addresses of the children, rising, each once; returns their number.
 fn list_children(placed: &Placed, children: &mut [u64]) -> usize {
     for (i, child) in children.iter_mut().enumerate() {
-        *child = placed.get(i).map_or(0, |placing| address(&placing));
+        *child = placed.child(i).map_or(0, |child| child.expose_provenance() as u64);
     }
     children.sort_unstable();
     let mut count = 0;
