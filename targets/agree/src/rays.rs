@@ -8,10 +8,10 @@ pub fn ray(shape: u32, i: u32) -> Ray {
     let centre = if shape == 2 { [1000.0, 0.0, 0.0] } else { [0.0; 3] };
     let from = [0, 1, 2].map(|k| centre[k] + random.whole(12) + random.part());
     // Every second ray starts and ends on the lattice.
-    let from = if i % 2 == 0 { from.map(|x| x as i32 as f32) } else { from };
+    let from = if i.is_multiple_of(2) { from.map(|x| x as i32 as f32) } else { from };
     let to = [0, 1, 2].map(|k| centre[k] + random.whole(5));
     let ahead = [to[0] - from[0], to[1] - from[1], to[2] - from[2]];
-    let ahead = if i % 2 == 0 { ahead } else { ahead.map(|x| x + 0.25 * random.part()) };
+    let ahead = if i.is_multiple_of(2) { ahead } else { ahead.map(|x| x + 0.25 * random.part()) };
     let ray = Ray::new(from, ahead);
     match i % 16 {
         5 => Ray::new(from, [0.0, 0.0, if from[2] > 0.0 { -1.0 } else { 1.0 }]),
