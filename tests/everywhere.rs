@@ -27,14 +27,9 @@ fn every_structure_and_backend_gives_the_number() {
     let expected = String::from_utf8(committed("agree.txt")).unwrap();
     for backend in Backend::ALL {
         backend.force();
-        let mut room = Box::<Room>::new_uninit();
-        // SAFETY: it has room for one.
-        #[allow(unsafe_code, reason = "as the C programs do")]
-        unsafe {
-            room.as_mut_ptr().write_bytes(0, 1);
-        }
+        let room = Box::<Room>::new_zeroed();
         // SAFETY: zeros are a value of all that is in it.
-        #[allow(unsafe_code, reason = "as above")]
+        #[allow(unsafe_code, reason = "as the C programs do")]
         let mut room = unsafe { room.assume_init() };
         assert_eq!(format!("answers {:08x}\n", room.agree(400)), expected, "{backend:?}");
     }

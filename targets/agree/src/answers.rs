@@ -140,7 +140,7 @@ fn trace(accel: &Accel, shape: u32, count: u32, hash: &mut Hash) {
         // What watertight queries find beyond that is another matter in each structure.
         let loosely = QueryOptions { precision: Precision::Watertight, ..QueryOptions::default() };
         hash.add(u32::from(hit.is_none() || accel.occluded_with(&ray, &loosely)));
-        if i % 8 == 0 {
+        if i.is_multiple_of(8) {
             rarely(accel, &ray, hit, hash);
         }
     }
