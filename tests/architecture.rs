@@ -18,7 +18,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("block", &["error", "kinds", "math", "storage"]),
     ("scene", &["block", "math"]),
     ("instance", &["block", "error", "exact", "math", "ray", "scene"]),
-    ("interval", &["exact", "math"]),
+    ("interval", &["exact", "math", "simd"]),
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
     ("query", &["block", "exact", "interval", "math", "ray", "sieve", "simd"]),
@@ -44,7 +44,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         ],
     ),
     ("surface", &["exact", "instance", "interval", "math"]),
-    ("trace", &["block", "bvh", "grid", "kinds", "prim", "query", "ray", "simd"]),
+    ("trace", &["block", "bvh", "grid", "kinds", "math", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
     ("levels", &["block", "instance", "math", "prim", "query", "ray", "simd", "trace"]),
     ("hits", &["block", "levels", "query", "ray", "trace"]),
