@@ -8,16 +8,15 @@ use super::{Kernel, Lanes, Simd, Width, corner};
 #[derive(Clone, Copy)]
 pub(crate) struct Scalar;
 
-fn zip<const N: usize>(mut a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> f32) -> [f32; N] {
-    for (a, b) in a.iter_mut().zip(b) {
-        *a = f(*a, b);
-    }
-    a
+// The remainders are for compilers that do not see that there is nothing to check; loops over pairs take twice as long where
+// there are no vectors.
+
+fn zip<const N: usize>(a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> f32) -> [f32; N] {
+    core::array::from_fn(|i| f(a[i % N], b[i % N]))
 }
 
 fn mask<const N: usize>(a: [f32; N], b: [f32; N], f: impl Fn(f32, f32) -> bool) -> u32 {
-    let lanes = a.into_iter().zip(b).enumerate();
-    lanes.fold(0, |bits, (i, (a, b))| bits | u32::from(f(a, b)) << i)
+    (0..N).fold(0, |bits, i| bits | u32::from(f(a[i % N], b[i % N])) << i)
 }
 
 /// Writes those of `values` that `mask` names to the front of `out`.
