@@ -56,11 +56,13 @@ cargo_for() {
     fi
 }
 
-# library TARGET FEATURES: where libraykern.a is, with these kinds of blocks. One that can panic does not link.
+# library TARGET FEATURES [PANICS]: where libraykern.a is, with these kinds of blocks. One that can panic does not link, unless
+# PANICS is `freestanding`: it is held to that for microcontrollers.
 library() {
-    local folder=$work/lib-${2//,/-}
+    local panics=${3:-panic-free}
+    local folder=$work/lib-$panics-${2//,/-}
     (cd .. && CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked -p raykern-c --profile embedded \
-        --no-default-features --features "panic-free${2:+,$2}" --target "$1" --crate-type staticlib) >&2
+        --no-default-features --features "$panics${2:+,$2}" --target "$1" --crate-type staticlib) >&2
     echo "$folder/$1/embedded/libraykern.a"
 }
 
@@ -196,7 +198,7 @@ user() { # Rust target, C compiler, emulator
     native "$image" >"$work/$name.txt" || { cat "$work/$name.txt" >&2; return 1; }
     same agree.txt "$work/$name.txt"
     # A block of the other byte order is refused; the others give the picture.
-    small=$(library "$1" "")
+    small=$(library "$1" "" freestanding)
     "$2" -O1 -static -ffp-contract=off -I ../include -I board programs/picture.c board/host.c "$small" -o "$image"
     native "$image" >"$work/$name.txt"
     case $name in

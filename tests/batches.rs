@@ -175,8 +175,36 @@ fn rays_of_a_camera() {
         for count in [7, 8, 9, 63, 64, 65, 100] {
             same_in_all(&mixed, &rays[..count]);
         }
+        // Rays of a packet that hit nothing by definition.
+        let mut lost = rays.clone();
+        for ray in lost.iter_mut().skip(2).step_by(7) {
+            ray.origin[1] = f32::NAN;
+        }
+        same_in_all(&mixed, &lost);
         same_in_all(&mixed, &with_odd_ones(rays));
     }
+}
+
+/// Single floats do not tell on which side of the triangle they start or end.
+#[test]
+fn rays_that_leave_a_large_triangle() {
+    let mut mesh = make::blob(1_500, 4);
+    let first = mesh.vertices.len() as u32;
+    mesh.vertices.extend([[-900.0, -700.0, 0.0], [900.0, -700.0, 0.0], [0.0, 1300.0, 0.0]]);
+    mesh.indices.push([first, first + 1, first + 2]);
+    let rays: Vec<Ray> = (0..640)
+        .map(|i| {
+            let side = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let height = side * 2f32.powi(-(i / 2 % 24) - 4);
+            let ray = Ray::new([5.0 + 0.01 * i as f32, 8.0, height], [1.0, 0.25, -0.03125]);
+            // Below the plane nothing is met, but just before it.
+            let t_min = if i % 3 == 0 { 33.0 * height } else { 0.0 };
+            let t_max = if i % 5 == 0 { 32.0 * height } else { 50.0 };
+            ray.with_limits(t_min.min(t_max), t_max)
+        })
+        .collect();
+    let hits = same_in_all(&mesh.into(), &rays);
+    assert!(hits > 1_000, "{hits}");
 }
 
 #[test]
