@@ -190,6 +190,7 @@ user() { # Rust target, C compiler, emulator
     powerpc-*) install "$2" gcc-powerpc-linux-gnu libc6-dev-powerpc-cross ;;
     powerpc64*) install "$2" gcc-powerpc64-linux-gnu libc6-dev-ppc64-cross ;;
     esac
+    [ "$3" = - ] || install "$3" qemu-user
     local folder image=$work/$name.elf small
     folder=$(agree "$1" staticlib)
     "$2" -O1 -static -I board programs/agree.c board/host.c "$folder/libagree.a" -o "$image"
