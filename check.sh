@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change lands. Needs Rust and a C compiler; installs the rest
-# (Debian packages by name). Under 15 minutes on two cores.
+# (Debian packages by name). Some 20 minutes on two cores.
 #
 #   ./check.sh            all of it, but for most of the other processors
 #   ./check.sh all        these too
