@@ -194,6 +194,9 @@ impl<'m, const MEMORY: usize> Together<'m> for ClosestHit<Exact, (), MEMORY> {
     ) -> u32 {
         let mut unsettled = lanes;
         for half in [0, 8] {
+            if lanes >> half & 0xFF == 0 {
+                continue;
+            }
             let mut corners = [[0.0; 8]; 9];
             let mut named = [None; 8];
             let mut last = None;

@@ -79,14 +79,6 @@ struct Batch<'a, 'm, Q: Question<'m>, A> {
     question: Q,
 }
 
-/// See the modules of these names.
-#[derive(Clone, Copy)]
-enum Way {
-    Stream,
-    InFlight,
-    OneByOne,
-}
-
 impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
     type Output = ();
 
@@ -128,25 +120,14 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Traces rays that are not alike.
     #[inline(always)]
     fn trace_apart<S: Simd>(self, s: S) {
-        match self.way() {
-            Way::Stream => self.stream(s),
-            Way::InFlight => self.fly(s),
-            Way::OneByOne => {
-                let Batch { block, rays, answers, question, .. } = self;
-                ask_each(block.whole, rays, answers, question);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn way(&self) -> Way {
         let size = self.block.whole.bytes().len();
         if size < SMALL || self.begin_together() {
-            Way::Stream
+            self.stream(s);
         } else if size < NEAR[usize::from(!Q::Query::ORDERED)] {
-            Way::OneByOne
+            let Batch { block, rays, answers, question, .. } = self;
+            ask_each(block.whole, rays, answers, question);
         } else {
-            Way::InFlight
+            self.fly(s);
         }
     }
 

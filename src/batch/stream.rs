@@ -126,13 +126,14 @@ impl<Q: Query> Stream<'_, '_, Q> {
                 least = Width::<16>::select(s, children, near.min(least), least);
             }
         }
-        for child in Bits(Width::<16>::used_words(s, &entered)) {
+        let lanes = Width::<16>::used_words(s, &entered);
+        for child in Bits(lanes) {
             fetch(s, self.bundles, &self.leaves, bundle.refs[child % 16]);
         }
         if Q::ORDERED {
-            stack.push_by_distance(s, bundle, &entered, least)
+            stack.push_by_distance(s, bundle, lanes, &entered, least)
         } else {
-            stack.push(s, bundle, &entered)
+            stack.push(s, bundle, lanes, &entered)
         }
     }
 

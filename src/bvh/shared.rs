@@ -6,7 +6,7 @@ use core::mem::MaybeUninit;
 
 use super::wide::ENOUGH_ROOM;
 use crate::block::bundle::{Bundle, ChildRef};
-use crate::simd::{Simd, Width};
+use crate::simd::{NUMBERS, Simd, Width};
 
 /// Children to come back to, each with the rays that enter it: one bit a ray.
 ///
@@ -28,14 +28,19 @@ impl SharedStack {
         }
     }
 
-    /// Pushes those children of a bundle that a ray enters, in their order; false when there is no room. `entered` has the
-    /// rays that enter each.
+    /// Pushes the children in the lanes of `lanes`, in their order; false when there is no room. `entered` has the rays that
+    /// enter each.
     #[inline(always)]
-    pub fn push<S: Simd>(&mut self, s: S, bundle: &Bundle<16>, entered: &[u32; 16]) -> bool {
+    pub fn push<S: Simd>(
+        &mut self,
+        s: S,
+        bundle: &Bundle<16>,
+        lanes: u32,
+        entered: &[u32; 16],
+    ) -> bool {
         let refs = self.refs.get_mut(self.count..).and_then(|refs| refs.first_chunk_mut::<16>());
         let rays = self.rays.get_mut(self.count..).and_then(|rays| rays.first_chunk_mut::<16>());
         let (Some(refs), Some(rays)) = (refs, rays) else { return false };
-        let lanes = Width::<16>::used_words(s, entered);
         s.compress_words(lanes, ChildRef::words(&bundle.refs), refs);
         s.compress_words(lanes, entered, rays);
         self.count += lanes.count_ones() as usize;
@@ -48,14 +53,13 @@ impl SharedStack {
         &mut self,
         s: S,
         bundle: &Bundle<16>,
+        lanes: u32,
         entered: &[u32; 16],
         near: <S as Width<16>>::V,
     ) -> bool {
-        const NUMBERS: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-        let lanes = Width::<16>::used_words(s, entered);
         let count = lanes.count_ones() as usize;
         if count < 2 {
-            return self.push(s, bundle, entered);
+            return self.push(s, bundle, lanes, entered);
         }
         let (mut depths, mut order) = ([MaybeUninit::uninit(); 16], [MaybeUninit::uninit(); 16]);
         s.sort(lanes, near, &NUMBERS, &mut depths, &mut order);

@@ -5,6 +5,7 @@ use super::steps::{Level, Sides};
 use crate::block::cells::{
     Cell, CellBox, EMPTY, GridHead, MOST_DEPTH, Run, SIDES, cell, resolution, side_ahead,
 };
+use crate::math::rounding::{f32_above, f32_below};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
@@ -144,8 +145,8 @@ fn follow<S: Simd, Q: Query>(
                 let listed = match cell(word) {
                     Cell::Boxed(first) => match part_in(s, cells, &level, first, sides, bound) {
                         Some([near, far]) => {
-                            let part =
-                                [(start + f64::from(near)) as f32, (start + f64::from(far)) as f32];
+                            let (near, far) = (f64::from(near), f64::from(far));
+                            let part = [f32_below(start + near), f32_above(start + far)];
                             Some((first + 1, part))
                         }
                         None => None,

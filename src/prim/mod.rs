@@ -156,6 +156,7 @@ impl Leaves<'_> {
         let look = Look { block, number, lanes, ray, query };
         if S::SMALL { s.run(look) } else { look.run(s) }
     }
+
     #[inline(never)]
     fn spheres<Q: Query>(
         &self,

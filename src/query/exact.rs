@@ -208,7 +208,7 @@ impl Exact {
         let u = s.load(&s.narrowed(weights[0])).max(zero).min(one).add(zero);
         let v = s.load(&s.narrowed(weights[1])).max(zero).min(one.sub(u)).add(zero);
         let mut met = SureMeetings { sure: clear, t: [0.0; 8], weights: [[0.0; 8]; 2] };
-        // Nothing of an interval is below its middle, or above, by less than rounding.
+        // Rounding keeps order: if both ends round to the float of the middle, so does the real `t` between them.
         met.sure &= nearest.less_or_equal(near) & far.less_or_equal(nearest);
         nearest.add(zero).store(&mut met.t);
         u.store(&mut met.weights[0]);

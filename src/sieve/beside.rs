@@ -27,7 +27,7 @@ impl<V: Lanes<16>> Span<V> {
         let [y_least, y_most] = between(s, s.load(ys), y, depths, &spread.slope[1]);
         let (least, most) = (Across { x: x_least, y: y_least }, Across { x: x_most, y: y_most });
         let deepest = depths[0].abs().max(depths[1].abs());
-        // A little more than derived, for the rounding of this.
+        // `2.5 u` of the size and `blur` a unit of depth are derived in docs/METHODS.md; the rest is for the rounding of this.
         let shared = deepest.mul(s.splat(1.01 * spread.blur)).add(s.splat(TINY));
         let error = least.size().max(most.size()).mul(s.splat(3.0 * UNIT32)).add(shared);
         Span { least, most, error }

@@ -4,7 +4,7 @@ use super::areas::{Across, Along, AreaError, Areas, shared_error};
 use super::meetings::{Meetings, Middle};
 use crate::block::leaf::TriangleBlock;
 use crate::ray::PreparedRay;
-use crate::simd::{Lanes, Scalar, Simd, Width};
+use crate::simd::{Lanes, NUMBERS, Scalar, Simd, Width};
 
 /// What is left of a block, one bit a lane.
 ///
@@ -48,7 +48,6 @@ impl<V: Lanes<16>> Triangles<V> {
     /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
     #[inline(always)]
     pub fn nearest<S: Simd + Width<16, V = V>>(&self, s: S, lanes: u32) -> u32 {
-        const NUMBERS: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
         // Above zero, as the order is that of bits.
         let ahead = Width::<16>::splat(s, 2.0 * self.middle.half);
         let depth = self.meetings.rise.div(self.meetings.total).add(ahead);

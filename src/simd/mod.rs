@@ -41,6 +41,9 @@ use core::sync::atomic::{AtomicU8, Ordering};
 pub(crate) use doubles::Doubles;
 pub(crate) use scalar::Scalar;
 
+/// The number of each of sixteen lanes.
+pub(crate) const NUMBERS: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
 /// `N` floats side by side.
 pub(crate) trait Lanes<const N: usize>: Copy {
     fn add(self, other: Self) -> Self;
