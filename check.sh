@@ -9,9 +9,14 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
+# Nothing here is compiled a second time, and what that would be faster by fills the disk.
+export CARGO_INCREMENTAL=0
 
 # What every step with tests asks for: other features of any crate would compile the core once more, which takes minutes.
 all=(--workspace --features raykern/capi)
+
+# Optimised as programs are, but by all cores: this takes half as long, and what is measured here means nothing.
+released() { CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 cargo "$@"; }
 
 step_install() {
     local missing=()
@@ -96,7 +101,7 @@ step_all_targets() { targets/run.sh all; }
 step_fuzz() (
     cd fuzz
     export RUSTC_BOOTSTRAP=1
-    cargo build --release
+    released build --release
     findings=$(mktemp -d)
     for target in mesh ray block; do
         echo "-- $target"
@@ -112,19 +117,19 @@ step_fuzz() (
 
 # A million rays a scene against Embree, every difference judged exactly.
 step_embree() {
-    cargo test --release -p raykern-harness --features embree --test compare_embree -- --nocapture
+    released test --release -p raykern-harness --features embree,raykern/capi --test compare_embree -- --nocapture
 }
 
 # Rays that look for trouble, all answers judged exactly; Embree on the same rays.
 step_stress() {
-    cargo run --release -p raykern-harness --bin stress -- --rays 200000 --embree
+    released run --release -p raykern-harness --features raykern/capi --bin stress -- --rays 200000 --embree
 }
 
 # The main job, cut short.
-step_compare() { cargo run --release --example compare -- --runs 2 --budget 20 --out target/compare-check; }
+step_compare() { released run --release --features capi --example compare -- --runs 2 --budget 20 --out target/compare-check; }
 
 # The comparison with Embree, cut short: its answers are checked, its times mean nothing here.
-step_bench() { cargo run --release -p raykern-bench --features embree -- --quick; }
+step_bench() { released run --release -p raykern-bench --features embree -- --quick; }
 
 steps=(install format clippy build test backends docs header c targets fuzz embree stress compare bench)
 case ${1:-} in

@@ -62,7 +62,8 @@ mod block;
 mod build;
 mod bvh;
 mod caller;
-#[cfg(feature = "capi")]
+// Unit tests link the harness, and with it these names already.
+#[cfg(all(feature = "capi", not(test)))]
 #[allow(unsafe_code, reason = "C passes pointers, and calls by name")]
 mod capi;
 mod choice;

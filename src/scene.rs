@@ -266,7 +266,10 @@ impl<'a, 'c> Scene<'a, 'c> {
     }
 
     /// A scene whose geometries and instances are made when they are asked for.
-    #[cfg_attr(not(feature = "capi"), expect(dead_code, reason = "only the C face needs it"))]
+    #[cfg_attr(
+        any(not(feature = "capi"), test),
+        expect(dead_code, reason = "only the C face needs it")
+    )]
     pub(crate) const fn foreign(
         geometries: &'a (dyn Geometries + 'a),
         instances: &'c (dyn Placements + 'c),

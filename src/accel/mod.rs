@@ -61,7 +61,7 @@ impl<'m> Accel<'m> {
     /// # Safety
     ///
     /// `block` is the first byte of such a block, which nobody writes to during `'m`.
-    #[cfg(feature = "capi")]
+    #[cfg(all(feature = "capi", not(test)))]
     #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
     #[inline(always)]
     pub(crate) unsafe fn from_ptr(block: *const u8) -> Option<Accel<'m>> {
