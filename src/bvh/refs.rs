@@ -118,6 +118,28 @@ pub(crate) fn gather(
     end
 }
 
+/// The refs that there would be for each primitive, seen from a few hundred of them. `refs` is overwritten.
+pub(crate) fn refs_per_prim(
+    scene: &Scene,
+    census: &Census,
+    strip: usize,
+    refs: &mut [PrimRef],
+) -> f32 {
+    const WINDOW: usize = 64;
+    const WINDOWS: usize = 16;
+    let all = census.prim_limit as usize;
+    let strips = Some((strip, Areas::new(&census.bounds)));
+    let (mut prims, mut count) = (0, 0);
+    for start in (0..all).step_by((all / WINDOWS).max(WINDOW)) {
+        let ids = start..(start + WINDOW).min(all);
+        prims += ids.len();
+        let mut part = Part { ids, refs: &mut *refs, count: 0 };
+        part.gather(scene, census, strips);
+        count += part.count;
+    }
+    count as f32 / prims as f32
+}
+
 /// How many of these can be hit.
 fn hittable(scene: &Scene, ids: &Range<usize>) -> usize {
     let mut count = 0;

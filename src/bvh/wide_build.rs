@@ -8,7 +8,7 @@ use super::collapse::Grounds;
 use super::compact;
 use super::emit::{Chosen, Sizes};
 use super::fill::pack;
-use super::refs::{PrimRef, gather};
+use super::refs::{PrimRef, gather, refs_per_prim};
 use super::reinsert::mend;
 use super::split::Areas;
 use super::tree::Limits;
@@ -236,6 +236,9 @@ fn grow_tree(
     Scratch::new(&places, &size)
 }
 
+/// So many refs, of as many as there would be at the least, and strips are not worth it.
+const FOLLOWED: f32 = 1.4;
+
 /// Refs of up to `strip` triangles, and the leaves that a tree over them takes.
 struct Gathered {
     count: usize,
@@ -253,6 +256,10 @@ fn gather_strips(
 ) -> Gathered {
     let mixed = census.is_mixed();
     let mut strip = if mixed || census.is_index { 1 } else { how.effort.strip };
+    // Where few triangles follow a neighbour, strips are but more leaves.
+    while strip > 1 && refs_per_prim(scene, census, strip, refs) > FOLLOWED / strip as f32 {
+        strip /= 2;
+    }
     loop {
         let count = gather(scene, census, strip, how.caller, refs);
         let leaves = leaf_budget(count, mixed, leaf_max(census, strip), false);
