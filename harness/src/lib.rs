@@ -13,3 +13,4 @@ pub mod search;
 pub mod shared_scenes;
 pub mod stats;
 pub mod stress;
+pub mod textbook;
