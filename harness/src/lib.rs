@@ -2,6 +2,7 @@
 
 pub mod assembly;
 pub mod chart;
+pub mod fit;
 pub mod load;
 pub mod make;
 pub mod model;

@@ -8,12 +8,14 @@
 mod case;
 mod families;
 mod figures;
+mod growth;
 mod judge;
 mod methods;
 mod options;
 mod ordinary;
 mod page;
 mod rows;
+mod structures;
 mod summary;
 mod timing;
 mod worker;
@@ -70,4 +72,11 @@ fn measure(options: &Options) -> Result<()> {
 type Part = (&'static str, fn(&Options) -> Result<()>);
 
 /// What can be measured, each into files of its own.
-const PARTS: [Part; 2] = [("scenes", ordinary::measure), ("families", families::measure)];
+const PARTS: [Part; 6] = [
+    ("scenes", ordinary::measure),
+    ("families", families::measure),
+    ("costs", structures::measure_scenes),
+    ("sizes", structures::measure_sizes),
+    ("growth", growth::measure_triangles),
+    ("instances", growth::measure_instances),
+];

@@ -35,6 +35,12 @@ pub struct Options {
     /// Cases of each stress family, 250 rays each.
     #[arg(long, value_name = "N")]
     pub cases: Option<usize>,
+    /// How many triangles the largest of the growing scenes has.
+    #[arg(long, value_name = "N")]
+    pub largest: Option<usize>,
+    /// How many instances, likewise.
+    #[arg(long, value_name = "N")]
+    pub instances: Option<usize>,
     /// The core to stay on; else the one the program starts on.
     #[arg(long, value_name = "NUMBER")]
     pub core: Option<usize>,
@@ -62,6 +68,16 @@ impl Options {
     /// How many timed runs.
     pub fn run_count(&self) -> usize {
         self.runs.unwrap_or(if self.quick { 3 } else { 7 }).max(2)
+    }
+
+    /// How many triangles scenes grow to.
+    pub fn largest(&self) -> usize {
+        self.largest.unwrap_or(if self.quick { 32_000 } else { 10_000_000 })
+    }
+
+    /// How many instances they grow to.
+    pub fn most_instances(&self) -> usize {
+        self.instances.unwrap_or(if self.quick { 1_000 } else { 1_000_000 })
     }
 
     /// How many cases of each stress family.

@@ -16,7 +16,8 @@ use crate::timing::{Job, in_turns, spread};
 
 /// As these rays are called beside the stress families, one of which is "ordinary", in small scenes.
 pub const FAMILY: &str = "scenes";
-const KINDS: [Kind; 4] = [Kind::Primary, Kind::Diffuse, Kind::Random, Kind::Shadow];
+/// What is asked.
+pub const KINDS: [Kind; 4] = [Kind::Primary, Kind::Diffuse, Kind::Random, Kind::Shadow];
 /// Unless others are asked for: some generated, and some that must be at hand.
 const SCENES: [&str; 5] = ["sphere", "hair", "architecture", "chinese_dragon", "sponza_part"];
 /// As some of them are called, of which every answer is judged, whatever our exact methods say.

@@ -6,10 +6,11 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use raykern_harness::stress;
 
-use crate::figures::{Figure, tradeoff};
+use crate::figures::{Figure, cost, growth, tradeoff};
 use crate::methods::{self, AGAIN, Group};
 use crate::ordinary;
-use crate::rows::{self, Fact, Judged, Run};
+use crate::rows::{self, Build, Fact, Judged, Run};
+use crate::structures;
 use crate::summary::Summary;
 
 const STYLE: &str = include_str!("page.css");
@@ -17,6 +18,7 @@ const STYLE: &str = include_str!("page.css");
 /// What the page is made from.
 pub struct Numbers {
     pub facts: Vec<Fact>,
+    pub builds: Vec<Build>,
     pub runs: Vec<Run>,
     pub judged: Vec<Judged>,
 }
@@ -24,6 +26,7 @@ pub struct Numbers {
 impl Numbers {
     fn read(folder: &Path) -> Result<Self> {
         Ok(Numbers {
+            builds: rows::read(folder)?,
             facts: rows::read(folder)?,
             runs: rows::read(folder)?,
             judged: rows::read(folder)?,
@@ -54,6 +57,8 @@ pub fn write(data: &Path, out: &Path) -> Result<u64> {
     let mut page = Page::new(out)?;
     page.text(&format!("<dl>{}</dl>", facts(&numbers.facts)));
     tradeoffs(&mut page, &numbers)?;
+    needs(&mut page, &numbers)?;
+    growing(&mut page, &numbers)?;
     page.finish()?;
     Ok(numbers.not_exact())
 }
@@ -110,6 +115,34 @@ fn tradeoffs(page: &mut Page, numbers: &Numbers) -> Result<()> {
         page.figure(figure)?;
     }
     page.close_gallery();
+    Ok(())
+}
+
+/// No more than a scene needs.
+fn needs(page: &mut Page, Numbers { builds, runs, .. }: &Numbers) -> Result<()> {
+    page.section(
+        "No more than a scene needs",
+        "what each structure costs, and what the automatic choice takes",
+    );
+    page.table("Structures by scene", &cost::table(builds, runs));
+    page.open_gallery();
+    for scene in cost::scenes(builds, structures::COSTS) {
+        page.figure(cost::break_even(builds, runs, scene)?)?;
+    }
+    page.close_gallery();
+    page.figure(cost::sizes(builds, runs)?)
+}
+
+/// How it grows.
+fn growing(page: &mut Page, Numbers { builds, runs, .. }: &Numbers) -> Result<()> {
+    page.section("Growth", "build, memory and rays, by triangles and by instances");
+    for (family, what) in
+        [(crate::growth::TRIANGLES, "triangle"), (crate::growth::INSTANCES, "instance")]
+    {
+        for measure in growth::MEASURES {
+            page.figure(growth::chart(builds, runs, family, what, measure)?)?;
+        }
+    }
     Ok(())
 }
 

@@ -92,6 +92,23 @@ impl Judged {
     }
 }
 
+/// One build.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Build {
+    /// As in [`Run`].
+    pub family: String,
+    pub scene: String,
+    pub method: String,
+    /// Of triangles, or of instances.
+    pub count: usize,
+    pub run: usize,
+    pub seconds: f64,
+    /// What was kept.
+    pub bytes: usize,
+    /// Which structure it became.
+    pub took: String,
+}
+
 /// A scene that was measured.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SceneSize {
@@ -105,6 +122,10 @@ impl Row for Fact {
 
 impl Row for Run {
     const FILE: &'static str = "runs.csv";
+}
+
+impl Row for Build {
+    const FILE: &'static str = "builds.csv";
 }
 
 impl Row for Judged {

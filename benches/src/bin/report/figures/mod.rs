@@ -1,5 +1,7 @@
 //! The figures: each as SVG, with the numbers it shows and a sentence on what it says.
 
+pub mod cost;
+pub mod growth;
 pub mod tradeoff;
 
 use std::path::Path;
