@@ -1,9 +1,11 @@
-//! Charts as SVG: times with error bars here, marks and lines over two axes in [`plot`], rows of single runs in [`rows`].
+//! Charts as SVG: times with error bars here, marks and lines over two axes in [`plot`], rows of single runs in [`rows`], small
+//! pictures in [`tiles`].
 
 mod axis;
 mod draw;
 pub mod plot;
 pub mod rows;
+pub mod tiles;
 
 use std::path::Path;
 

@@ -13,6 +13,7 @@
 mod baldwin_weber;
 mod moeller_trumbore;
 mod tree;
+pub mod walk;
 mod woop_benthin_wald;
 
 use raykern::Ray;

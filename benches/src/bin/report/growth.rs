@@ -60,7 +60,7 @@ fn reference(name: &str, model: &Model, measured: &mut Measured) -> Option<Ready
         seconds,
         bytes,
     ));
-    Some(Ready { name: REFERENCE, tracer })
+    Some(Ready { name: REFERENCE, tracer: tracer.into() })
 }
 
 #[cfg(not(feature = "embree"))]
@@ -118,7 +118,7 @@ pub fn measure_instances(options: &Options) -> Result<()> {
         let accel = accel.map_err(|error| anyhow!("{count} instances: {error}"))?;
         let rays = around(&accel, RAYS);
         let single = Single::new(&Rc::new(accel), Precision::Exact);
-        let mut ready = vec![Ready { name: "BVH", tracer: Box::new(single) }];
+        let mut ready = vec![Ready { name: "BVH", tracer: Rc::new(single) }];
         ready.extend(reference_instances(&assembly, count, &mut measured));
         let job = Job { rays: &rays, any: false, coherent: false };
         time([INSTANCES, &name, "random"], &ready, &job, options, &mut measured);
@@ -136,7 +136,7 @@ fn reference_instances(
     let child = &assembly.children[0];
     let (tracer, seconds, bytes) = raykern_bench::embree::single_instances(child, &maps, EMBREE)?;
     measured.builds.push(build([INSTANCES, &count.to_string()], REFERENCE, count, seconds, bytes));
-    Some(Ready { name: REFERENCE, tracer })
+    Some(Ready { name: REFERENCE, tracer: tracer.into() })
 }
 
 #[cfg(not(feature = "embree"))]

@@ -5,6 +5,7 @@
 //! It measures into CSV files, one a part, and makes the page from these alone; so a page can be made again, or from files of
 //! another machine, without measuring.
 
+mod blog;
 mod case;
 mod families;
 mod figures;
@@ -14,6 +15,7 @@ mod methods;
 mod options;
 mod ordinary;
 mod page;
+mod pictures;
 mod rows;
 mod structures;
 mod summary;
@@ -72,11 +74,13 @@ fn measure(options: &Options) -> Result<()> {
 type Part = (&'static str, fn(&Options) -> Result<()>);
 
 /// What can be measured, each into files of its own.
-const PARTS: [Part; 6] = [
+const PARTS: [Part; 8] = [
     ("scenes", ordinary::measure),
     ("families", families::measure),
     ("costs", structures::measure_scenes),
     ("sizes", structures::measure_sizes),
     ("growth", growth::measure_triangles),
     ("instances", growth::measure_instances),
+    ("pictures", pictures::measure),
+    ("blog", blog::measure),
 ];

@@ -59,7 +59,7 @@ impl Group {
 
 /// A structure over one scene, ready to be asked.
 pub struct Built {
-    pub tracer: Box<dyn Tracer>,
+    pub tracer: Rc<dyn Tracer>,
     /// Of the median build.
     pub seconds: f64,
     /// Kept, triangles included; `None` when the library does not say.
@@ -133,23 +133,23 @@ impl Method {
                 let bytes = Some(accel.accel().block().len());
                 let single = Single::new(&accel, *precision);
                 let backend = backend.unwrap_or(Backend::detected());
-                Ok(Built { tracer: Box::new(Forced { single, backend }), seconds, bytes })
+                Ok(Built { tracer: Rc::new(Forced { single, backend }), seconds, bytes })
             }
             #[cfg(feature = "embree")]
             Make::Embree(way) => {
                 let (tracer, seconds, bytes) =
                     raykern_bench::embree::single(model, *way).ok_or("Embree refuses")?;
-                Ok(Built { tracer, seconds, bytes: Some(bytes) })
+                Ok(Built { tracer: tracer.into(), seconds, bytes: Some(bytes) })
             }
             #[cfg(feature = "peers")]
             Make::Library(build) => {
                 let (built, seconds) = timed_build(|| build(model));
                 let (tracer, bytes) = built?;
-                Ok(Built { tracer, seconds, bytes })
+                Ok(Built { tracer: tracer.into(), seconds, bytes })
             }
             Make::Textbook(build) => {
                 let ((tracer, bytes), seconds) = timed_build(|| build(model));
-                Ok(Built { tracer, seconds, bytes: Some(bytes) })
+                Ok(Built { tracer: tracer.into(), seconds, bytes: Some(bytes) })
             }
         }
     }

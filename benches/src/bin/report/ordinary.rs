@@ -11,8 +11,9 @@ use crate::case::merged;
 use crate::judge::{Judge, Tally, Truth};
 use crate::methods::{self, Built, Method};
 use crate::options::Options;
-use crate::rows::{self, Judged, Run, SceneSize};
-use crate::timing::{Job, in_turns, spread};
+use crate::rows::{self, Build, Judged};
+use crate::structures::{Measured, Ready, time};
+use crate::timing::{Job, spread};
 
 /// As these rays are called beside the stress families, one of which is "ordinary", in small scenes.
 pub const FAMILY: &str = "scenes";
@@ -29,19 +30,15 @@ const JUDGED_SECONDS: f64 = 1.0;
 
 /// Measures every scene.
 pub fn measure(options: &Options) -> Result<()> {
-    let (mut judged, mut runs, mut sizes) = (Vec::new(), Vec::new(), Vec::new());
+    let mut measured = Measured::default();
+    let mut judged = Vec::new();
     for (name, scene) in scenes(options) {
         eprintln!("  {name}");
-        sizes.push(SceneSize { scene: name.clone(), triangles: scene.model.triangle_count() });
-        let (some, timed) = measure_scene(&name, &scene, options)?;
-        judged.extend(some);
-        runs.extend(timed);
+        judged.extend(measure_scene(&name, &scene, options, &mut measured)?);
     }
-    rows::write(options.data(), &sizes)?;
-    rows::replace(options.data(), judged, |row: &Judged| {
-        [FAMILY, SAMPLE].contains(&row.family.as_str())
-    })?;
-    rows::replace(options.data(), runs, |row: &Run| row.family == FAMILY)
+    let ours = |family: &str| [FAMILY, SAMPLE].contains(&family);
+    rows::replace(options.data(), judged, |row: &Judged| ours(&row.family))?;
+    measured.replace(options, FAMILY)
 }
 
 /// The scenes asked for that can be had, by name.
@@ -71,52 +68,63 @@ pub fn scenes(options: &Options) -> Vec<(String, Loaded)> {
     cases.iter().filter_map(load).collect()
 }
 
-fn measure_scene(name: &str, scene: &Loaded, options: &Options) -> Result<(Vec<Judged>, Vec<Run>)> {
+fn measure_scene(
+    name: &str,
+    scene: &Loaded,
+    options: &Options,
+    measured: &mut Measured,
+) -> Result<Vec<Judged>> {
     let reference = raykern_bench::ours::bvh(&scene.model, Layout::Automatic)?;
     let accel = reference.accel();
     let maker = RayMaker::new(scene, &accel, options.ray_count());
-    let mut built: Vec<(Method, Built)> = Vec::new();
-    for method in methods::all() {
-        match method.build(&scene.model) {
-            Ok(structure) => built.push((method, structure)),
-            Err(reason) => eprintln!("  {}: {reason}", method.name),
-        }
-    }
-    let tracers: Vec<_> = built.iter().map(|(_, built)| built.tracer.as_ref()).collect();
+    let built = build_all(name, scene, measured);
+    let ready: Vec<Ready> = (built.iter())
+        .map(|(method, built)| Ready { name: method.name, tracer: built.tracer.clone() })
+        .collect();
     let judge = Judge::new(&scene.model);
-    let (mut judged, mut runs) = (Vec::new(), Vec::new());
+    let mut judged = Vec::new();
     for kind in KINDS {
         let rays = maker.make(kind);
-        let job = Job {
-            rays: &rays,
-            any: kind.question() == Question::Any,
-            coherent: kind.is_coherent(),
-        };
-        for timed in in_turns(&tracers, &job, options.run_count()) {
-            runs.push(Run {
-                family: FAMILY.to_owned(),
-                scene: name.to_owned(),
-                kind: kind.name().to_owned(),
-                method: built[timed.method].0.name.to_owned(),
-                run: timed.run,
-                rays: timed.rays,
-                seconds: timed.seconds,
-            });
-        }
+        let any = kind.question() == Question::Any;
+        let job = Job { rays: &rays, any, coherent: kind.is_coherent() };
+        time([FAMILY, name, kind.name()], &ready, &job, options, measured);
         let presumed = |ray| Judge::presumed(accel.intersect(ray).unwrap_or(Hit::MISS));
         let truths: Vec<_> = rays.iter().map(presumed).collect();
         let sample = spread(&rays, JUDGED);
         let known: Vec<_> = sample.iter().map(|ray| judge.truth(ray)).collect();
         // Ours come last, when all who contradict have been heard.
-        for (method, structure) in built.iter().rev() {
-            let name_of = |family| [family, name, kind.name(), method.name];
-            let tally = judge_answers(&judge, (&rays, &truths), method, structure, job.any);
-            judged.push(Judged::new(name_of(FAMILY), &tally));
-            let tally = judge_answers(&judge, (&sample, &known), method, structure, job.any);
-            judged.push(Judged::new(name_of(SAMPLE), &tally));
+        for (method, built) in built.iter().rev() {
+            for (family, rays, truths) in [(FAMILY, &rays, &truths), (SAMPLE, &sample, &known)] {
+                let tally = judge_answers(&judge, (rays, truths), method, built, any);
+                judged.push(Judged::new([family, name, kind.name(), method.name], &tally));
+            }
         }
     }
-    Ok((judged, runs))
+    Ok(judged)
+}
+
+/// Every method over a scene, with what its build cost.
+fn build_all(name: &str, scene: &Loaded, measured: &mut Measured) -> Vec<(Method, Built)> {
+    let mut all = Vec::new();
+    for method in methods::all() {
+        match method.build(&scene.model) {
+            Ok(built) => {
+                measured.builds.push(Build {
+                    family: FAMILY.to_owned(),
+                    scene: name.to_owned(),
+                    method: method.name.to_owned(),
+                    count: scene.model.triangle_count(),
+                    run: 0,
+                    seconds: built.seconds,
+                    bytes: built.bytes.unwrap_or(0),
+                    took: String::new(),
+                });
+                all.push((method, built));
+            }
+            Err(reason) => eprintln!("  {}: {reason}", method.name),
+        }
+    }
+    all
 }
 
 fn judge_answers(

@@ -6,10 +6,11 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use raykern_harness::stress;
 
-use crate::figures::{Figure, cost, growth, tradeoff};
+use crate::figures::{Figure, blog, cost, failures, growth, tradeoff};
 use crate::methods::{self, AGAIN, Group};
 use crate::ordinary;
-use crate::rows::{self, Build, Fact, Judged, Run};
+use crate::pictures;
+use crate::rows::{self, Build, Fact, Judged, Run, Square};
 use crate::structures;
 use crate::summary::Summary;
 
@@ -21,6 +22,7 @@ pub struct Numbers {
     pub builds: Vec<Build>,
     pub runs: Vec<Run>,
     pub judged: Vec<Judged>,
+    pub squares: Vec<Square>,
 }
 
 impl Numbers {
@@ -30,6 +32,7 @@ impl Numbers {
             facts: rows::read(folder)?,
             runs: rows::read(folder)?,
             judged: rows::read(folder)?,
+            squares: rows::read(folder)?,
         })
     }
 
@@ -59,6 +62,11 @@ pub fn write(data: &Path, out: &Path) -> Result<u64> {
     tradeoffs(&mut page, &numbers)?;
     needs(&mut page, &numbers)?;
     growing(&mut page, &numbers)?;
+    page.section(
+        "As the blog post measured",
+        "ten runs of each structure, one after the other, mean and Student's interval of 95 %",
+    );
+    page.table("Ten runs", &blog::table(&numbers.runs));
     page.finish()?;
     Ok(numbers.not_exact())
 }
@@ -105,16 +113,26 @@ fn tradeoffs(page: &mut Page, numbers: &Numbers) -> Result<()> {
     page.section("Every run", "nothing is hidden by a mean");
     page.figure(tradeoff::runs("runs", "Every run over Embree's beside it", &scenes)?)?;
     page.section("Each stress family", "where methods fail");
-    failures(page, numbers);
+    failure_table(page, numbers);
     page.open_gallery();
     for family in &stress::ALL {
         let summaries = numbers.summaries(|name| name == family.name);
+        // Without the reference there is no speed to show.
+        if summaries.iter().all(|summary| summary.speed.is_none()) {
+            continue;
+        }
         let mut figure =
             tradeoff::wrong(&format!("family-{}", family.name), family.name, &summaries, true)?;
-        figure.caption = format!("{}.", family.about);
+        figure.caption = sentence(family.about);
         page.figure(figure)?;
     }
     page.close_gallery();
+    page.section("What failures look like", "one ray a square");
+    for picture in &pictures::ALL {
+        if let Some(figure) = failures::picture(picture, &numbers.squares)? {
+            page.figure(figure)?;
+        }
+    }
     Ok(())
 }
 
@@ -125,6 +143,11 @@ fn needs(page: &mut Page, Numbers { builds, runs, .. }: &Numbers) -> Result<()> 
         "what each structure costs, and what the automatic choice takes",
     );
     page.table("Structures by scene", &cost::table(builds, runs));
+    let methods: Vec<&str> = methods::all().iter().map(|method| method.name).collect();
+    page.table(
+        "Builds of all methods, the mean of the scenes",
+        &cost::builds_table(builds, &methods),
+    );
     page.open_gallery();
     for scene in cost::scenes(builds, structures::COSTS) {
         page.figure(cost::break_even(builds, runs, scene)?)?;
@@ -147,7 +170,7 @@ fn growing(page: &mut Page, Numbers { builds, runs, .. }: &Numbers) -> Result<()
 }
 
 /// A table of families by methods: wrong answers of so many.
-fn failures(page: &mut Page, numbers: &Numbers) {
+fn failure_table(page: &mut Page, numbers: &Numbers) {
     let methods: Vec<_> = methods::all().into_iter().filter(|m| m.name != AGAIN).collect();
     let mut lines = vec![vec!["family".to_owned()]];
     lines[0].extend(methods.iter().map(|method| method.name.to_owned()));
@@ -189,11 +212,8 @@ impl<'a> Page<'a> {
     }
 
     pub fn section(&mut self, title: &str, about: &str) {
-        self.text(&format!("<h2>{}</h2>\n<p>{}.</p>", escaped(title), escaped(about)));
-    }
-
-    pub fn paragraph(&mut self, words: &str) {
-        self.text(&format!("<p>{}</p>", escaped(words)));
+        let about = escaped(&sentence(about));
+        self.text(&format!("<h2>{}</h2>\n<p>{about}</p>", escaped(title)));
     }
 
     fn open_gallery(&mut self) {
@@ -260,6 +280,13 @@ fn scalable(svg: &str) -> String {
         ),
         _ => svg.to_owned(),
     }
+}
+
+/// With a capital and a full stop.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
 }
 
 fn escaped(text: &str) -> String {

@@ -103,17 +103,21 @@ pub struct Build {
     pub count: usize,
     pub run: usize,
     pub seconds: f64,
-    /// What was kept.
+    /// What is kept; zero when the library does not say.
     pub bytes: usize,
     /// Which structure it became.
     pub took: String,
 }
 
-/// A scene that was measured.
+/// A square of a picture.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct SceneSize {
-    pub scene: String,
-    pub triangles: usize,
+pub struct Square {
+    pub picture: String,
+    pub method: String,
+    pub x: usize,
+    pub y: usize,
+    /// The number of one of [`crate::pictures::OUTCOMES`].
+    pub outcome: usize,
 }
 
 impl Row for Fact {
@@ -128,12 +132,12 @@ impl Row for Build {
     const FILE: &'static str = "builds.csv";
 }
 
-impl Row for Judged {
-    const FILE: &'static str = "judged.csv";
+impl Row for Square {
+    const FILE: &'static str = "pictures.csv";
 }
 
-impl Row for SceneSize {
-    const FILE: &'static str = "scenes.csv";
+impl Row for Judged {
+    const FILE: &'static str = "judged.csv";
 }
 
 /// Writes a file anew.

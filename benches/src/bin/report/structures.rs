@@ -99,7 +99,7 @@ pub fn random_rays(model: &Model, count: usize) -> Vec<Ray> {
 /// A structure, ready to be asked.
 pub struct Ready {
     pub name: &'static str,
-    pub tracer: Box<dyn Tracer>,
+    pub tracer: Rc<dyn Tracer>,
 }
 
 /// Builds each structure some times, in turns.
@@ -139,7 +139,7 @@ pub fn build_all(
     }
     let ready = |(accel, (name, _)): (Option<OwnedAccel<'static>>, &(&'static str, Structure))| {
         let single = Single::new(&Rc::new(accel?), raykern::Precision::Exact);
-        Some(Ready { name, tracer: Box::new(single) })
+        Some(Ready { name, tracer: Rc::new(single) })
     };
     Ok(kept.into_iter().zip(structures).filter_map(ready).collect())
 }

@@ -12,6 +12,7 @@
 
 use std::io::{BufRead, Write};
 use std::process::ExitCode;
+use std::rc::Rc;
 
 use raykern::{Hit, NONE, Ray};
 use raykern_bench::lineup::Tracer;
@@ -68,7 +69,7 @@ impl Request {
 fn answer(request: &Request, methods: &[Method], out: &mut impl Write) -> std::io::Result<()> {
     let family = Family::by_name(&request.family).ok_or(std::io::ErrorKind::InvalidInput)?;
     let case = Case::of(&family, request.number);
-    let mut timed: Vec<(usize, Box<dyn Tracer>, Vec<Ray>)> = Vec::new();
+    let mut timed: Vec<(usize, Rc<dyn Tracer>, Vec<Ray>)> = Vec::new();
     for (number, method) in methods.iter().enumerate() {
         let rays: Vec<Ray> = case.asked(method).into_iter().map(|i| case.rays[i]).collect();
         if request.skipped.contains(&number) || rays.is_empty() {
@@ -115,7 +116,7 @@ pub fn parse_hit(line: &str) -> Option<Hit> {
 
 /// Times them on the rays that all of them are asked.
 fn time(
-    timed: &[(usize, Box<dyn Tracer>, Vec<Ray>)],
+    timed: &[(usize, Rc<dyn Tracer>, Vec<Ray>)],
     runs: usize,
     out: &mut impl Write,
 ) -> std::io::Result<()> {

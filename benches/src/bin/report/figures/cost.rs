@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use anyhow::Result;
 use raykern_harness::chart::plot::{Axis, Plot, Point, Scale, Series};
-use raykern_harness::stats::{median, median_interval};
+use raykern_harness::stats::median;
 
 use super::{Figure, lines, number};
+use crate::ordinary::FAMILY;
 use crate::rows::{Build, Run};
 use crate::structures::{ALL, AUTOMATIC, COSTS, SIZES};
 use crate::summary::geomean;
@@ -15,9 +16,8 @@ use crate::summary::geomean;
 #[derive(Clone)]
 pub struct Cost {
     pub count: usize,
-    /// Seconds of the median build, with the bootstrap interval of 95 % where there were several.
+    /// Seconds of the median build.
     pub build: f64,
-    pub build_interval: Option<(f64, f64)>,
     pub bytes: usize,
     /// Seconds a ray: the geometric mean over kinds of the median of the runs.
     pub ray: f64,
@@ -46,7 +46,6 @@ impl Cost {
         Some(Cost {
             count: mine.first()?.count,
             build: median(&seconds)?,
-            build_interval: median_interval(&seconds),
             bytes: mine.first()?.bytes,
             ray: geomean(&medians)?,
             took: mine.first()?.took.clone(),
@@ -114,6 +113,20 @@ pub fn table(builds: &[Build], runs: &[Run]) -> Vec<Vec<String>> {
         }
     }
     lines(&head, rows)
+}
+
+/// Of every method, by the geometric mean over the scenes: what a triangle takes to build, and to keep.
+pub fn builds_table(builds: &[Build], methods: &[&str]) -> Vec<Vec<String>> {
+    let row = |method: &&str| {
+        let mine = || builds.iter().filter(|b| b.family == FAMILY && b.method == *method);
+        let mean = |of: fn(&Build) -> f64| {
+            geomean(&mine().map(|b| of(b) / b.count as f64).collect::<Vec<_>>())
+        };
+        let bytes = mean(|b| b.bytes as f64).filter(|bytes| *bytes > 0.0);
+        let bytes = bytes.map_or("not told".to_owned(), number);
+        Some(vec![(*method).to_owned(), number(mean(|b| 1e9 * b.seconds)?), bytes])
+    };
+    lines(&["method", "build ns a triangle", "bytes a triangle"], methods.iter().filter_map(row))
 }
 
 /// Rays for each triangle that count as many.
@@ -236,7 +249,7 @@ mod tests {
 
     fn cost(build: f64, ray: f64) -> Cost {
         let took = String::new();
-        Cost { count: 10, build, build_interval: None, bytes: 1, ray, took, builds: 1, runs: 1 }
+        Cost { count: 10, build, bytes: 1, ray, took, builds: 1, runs: 1 }
     }
 
     #[test]

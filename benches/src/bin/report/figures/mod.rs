@@ -1,6 +1,8 @@
 //! The figures: each as SVG, with the numbers it shows and a sentence on what it says.
 
+pub mod blog;
 pub mod cost;
+pub mod failures;
 pub mod growth;
 pub mod tradeoff;
 
