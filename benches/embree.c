@@ -33,6 +33,8 @@ static bool on_memory(void *user, ssize_t bytes, bool post)
     return true;
 }
 
+int bench_embree_version(void) { return RTC_VERSION; }
+
 BenchEmbree *bench_embree_new(const char *config, int quality, int flags)
 {
     BenchEmbree *e = calloc(1, sizeof *e);

@@ -16,6 +16,8 @@ typedef struct { float t, u, v; uint32_t prim, geometry, instance; } BenchHit;
 typedef struct BenchEmbree BenchEmbree;
 typedef struct BenchBatch BenchBatch;
 
+/* The version whose header this was compiled with, such as 31305. */
+int bench_embree_version(void);
 /* A device of one thread. `config` is appended to its settings; `quality` is 0 low, 1 medium,
  * 2 high; `flags` are those of a scene. Null when the device cannot be had. */
 BenchEmbree *bench_embree_new(const char *config, int quality, int flags);

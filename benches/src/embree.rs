@@ -19,6 +19,7 @@ struct RawScene([u8; 0]);
 struct RawBatch([u8; 0]);
 
 unsafe extern "C" {
+    fn bench_embree_version() -> c_int;
     fn bench_embree_new(config: *const c_char, quality: c_int, flags: c_int) -> *mut RawScene;
     fn bench_embree_mesh(
         scene: *mut RawScene,
@@ -155,6 +156,13 @@ fn add_batches(lineup: &mut Lineup, name: &str, [streams, packets]: [Class; 2], 
         let batch = Batched { scene: scene.clone(), width, coherent };
         lineup.add(format!("{name} {form}"), class, batch);
     }
+}
+
+/// Embree's version, as its header says.
+pub fn version() -> String {
+    // SAFETY: it returns a constant.
+    let number = unsafe { bench_embree_version() };
+    format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100)
 }
 
 /// One scene, asked one ray at a time, with the seconds of its build and its bytes; `None` when Embree refuses.

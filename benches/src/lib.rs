@@ -4,6 +4,8 @@ pub mod c_face;
 pub mod check;
 #[cfg(feature = "embree")]
 pub mod embree;
+#[cfg(feature = "embree")]
+pub mod embree4;
 pub mod instances;
 pub mod lineup;
 pub mod measure;

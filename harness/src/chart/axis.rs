@@ -40,7 +40,7 @@ pub struct Placed {
 }
 
 /// The share of an axis that zero has to itself.
-const ZERO: f64 = 0.08;
+const ZERO: f64 = 0.1;
 
 impl Placed {
     /// Wide enough for all values that can be shown.

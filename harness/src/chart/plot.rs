@@ -32,7 +32,7 @@ impl Point {
 /// Marks of one kind.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// As in the legend.
+    /// As in the legend, which leaves out what has no name.
     pub name: String,
     /// The number of a colour and a shape.
     pub style: usize,
@@ -116,7 +116,7 @@ impl Plot {
     /// Returns the number of the last row.
     fn legend(&self, area: &Area, width: i32) -> Result<i32, DrawError<'static>> {
         let (mut x, mut row) = (24, 0);
-        for series in &self.series {
+        for series in self.series.iter().filter(|series| !series.name.is_empty()) {
             let room = 34 + text_width(&series.name, WORDS);
             if x + room > width - 8 && x > 24 {
                 (x, row) = (24, row + 1);
@@ -160,7 +160,7 @@ impl Plot {
             if moved {
                 let end = (place[0].clamp(px - 400, px + 400), (place[1] + place[3]) / 2);
                 let end = if place[0] < px { (place[2], end.1) } else { end };
-                area.draw(&PathElement::new([(px, py), end], FAINT))?;
+                area.draw(&PathElement::new([(px, py), end], INK.mix(0.4)))?;
             }
             write_text(area, &point.label, (place[0], place[1]), WORDS, HPos::Left, false)?;
             taken.push(place);

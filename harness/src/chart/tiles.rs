@@ -19,7 +19,7 @@ pub struct Panel {
 pub struct Tiles {
     /// Above all.
     pub title: String,
-    /// The kinds' names.
+    /// The kinds' names; those without are not explained.
     pub legend: Vec<String>,
     /// The pictures.
     pub panels: Vec<Panel>,
@@ -45,7 +45,7 @@ impl Tiles {
     fn draw(&self, area: &Area, side: i32) -> Result<(), DrawError<'static>> {
         write_text(area, &self.title, (16, 12), 18, HPos::Left, true)?;
         let mut x = 20;
-        for (name, color) in self.legend.iter().zip(KINDS) {
+        for (name, color) in self.legend.iter().zip(KINDS).filter(|(name, _)| !name.is_empty()) {
             area.draw(&Rectangle::new([(x, 44), (x + 12, 56)], color.filled()))?;
             write_text(area, name, (x + 18, 42), 14, HPos::Left, false)?;
             x += 36 + text_width(name, 14);

@@ -17,6 +17,7 @@ mod ordinary;
 mod page;
 mod pictures;
 mod rows;
+mod sections;
 mod structures;
 mod summary;
 mod timing;
@@ -52,7 +53,7 @@ fn run(options: &Options) -> Result<u64> {
     if options.from.is_none() {
         measure(options)?;
     }
-    page::write(options.data(), &options.out)
+    sections::write(options.data(), &options.out)
 }
 
 fn measure(options: &Options) -> Result<()> {

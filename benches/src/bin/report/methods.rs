@@ -84,6 +84,9 @@ enum Make {
     Ours(Structure, Precision, Option<Backend>),
     #[cfg(feature = "embree")]
     Embree(raykern_bench::embree::Way),
+    /// With these flags of a scene.
+    #[cfg(feature = "embree")]
+    Embree4(i32),
     #[cfg(feature = "peers")]
     Library(fn(&Model) -> Result<raykern_bench::peers::Built, String>),
     Textbook(fn(&Model) -> (Box<dyn Tracer>, usize)),
@@ -139,6 +142,11 @@ impl Method {
             Make::Embree(way) => {
                 let (tracer, seconds, bytes) =
                     raykern_bench::embree::single(model, *way).ok_or("Embree refuses")?;
+                Ok(Built { tracer: tracer.into(), seconds, bytes: Some(bytes) })
+            }
+            #[cfg(feature = "embree")]
+            Make::Embree4(flags) => {
+                let (tracer, seconds, bytes) = raykern_bench::embree4::single(model, *flags)?;
                 Ok(Built { tracer: tracer.into(), seconds, bytes: Some(bytes) })
             }
             #[cfg(feature = "peers")]
@@ -209,13 +217,18 @@ fn embree() -> impl Iterator<Item = Method> {
         ("Embree 3 compact", 1, COMPACT, c""),
         ("Embree 3 high", 2, PLAIN, c""),
     ];
-    ways.into_iter().map(|(name, quality, flags, config)| Method {
+    let fourth = [("Embree 4", PLAIN), ("Embree 4 robust", ROBUST)];
+    let fourth = fourth.into_iter().map(|(name, flags)| (name, Make::Embree4(flags)));
+    let third = ways
+        .into_iter()
+        .map(|(name, quality, flags, config)| (name, Make::Embree(Way { quality, flags, config })));
+    third.chain(fourth).map(|(name, make)| Method {
         name,
         group: Group::Embree,
         spheres: true,
         t_min: true,
         names: true,
-        make: Make::Embree(Way { quality, flags, config }),
+        make,
     })
 }
 
@@ -258,10 +271,10 @@ fn plain_tree<T: TriangleTest + 'static>(model: &Model) -> (Box<dyn Tracer>, usi
 
 /// The version of Embree that is linked, as its header says.
 pub fn embree_version() -> String {
-    match cfg!(feature = "embree") {
-        true => "3, as installed".to_owned(),
-        false => "left out".to_owned(),
-    }
+    #[cfg(feature = "embree")]
+    return raykern_bench::embree::version();
+    #[cfg(not(feature = "embree"))]
+    "left out".to_owned()
 }
 
 /// Ours with no more than these instructions; the processor's best are set again afterwards.

@@ -1,196 +1,13 @@
-//! The page: sections of figures and tables in one file that needs nothing else.
+//! The page: figures and tables in one file that needs nothing else.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use raykern_harness::stress;
 
-use crate::figures::{Figure, blog, cost, failures, growth, tradeoff};
-use crate::methods::{self, AGAIN, Group};
-use crate::ordinary;
-use crate::pictures;
-use crate::rows::{self, Build, Fact, Judged, Run, Square};
-use crate::structures;
-use crate::summary::Summary;
+use crate::figures::Figure;
 
 const STYLE: &str = include_str!("page.css");
-
-/// What the page is made from.
-pub struct Numbers {
-    pub facts: Vec<Fact>,
-    pub builds: Vec<Build>,
-    pub runs: Vec<Run>,
-    pub judged: Vec<Judged>,
-    pub squares: Vec<Square>,
-}
-
-impl Numbers {
-    fn read(folder: &Path) -> Result<Self> {
-        Ok(Numbers {
-            builds: rows::read(folder)?,
-            facts: rows::read(folder)?,
-            runs: rows::read(folder)?,
-            judged: rows::read(folder)?,
-            squares: rows::read(folder)?,
-        })
-    }
-
-    /// Every method over the families for which `wanted` holds.
-    fn summaries(&self, wanted: impl Fn(&str) -> bool) -> Vec<Summary> {
-        let methods = methods::all();
-        methods.iter().map(|m| Summary::of(m, &self.runs, &self.judged, &wanted)).collect()
-    }
-
-    /// How many answers of exact methods are not what they must be.
-    fn not_exact(&self) -> u64 {
-        let exact: Vec<_> = methods::all()
-            .into_iter()
-            .filter(|m| m.group == Group::Exact)
-            .map(|m| m.name)
-            .collect();
-        let ours = |row: &&Judged| exact.contains(&row.method.as_str());
-        self.judged.iter().filter(ours).map(|row| row.not_exact + row.gave_up).sum()
-    }
-}
-
-/// Writes the page, its figures and their numbers; returns how many answers of exact methods were wrong.
-pub fn write(data: &Path, out: &Path) -> Result<u64> {
-    let numbers = Numbers::read(data)?;
-    let mut page = Page::new(out)?;
-    page.text(&format!("<dl>{}</dl>", facts(&numbers.facts)));
-    tradeoffs(&mut page, &numbers)?;
-    needs(&mut page, &numbers)?;
-    growing(&mut page, &numbers)?;
-    page.section(
-        "As the blog post measured",
-        "ten runs of each structure, one after the other, mean and Student's interval of 95 %",
-    );
-    page.table("Ten runs", &blog::table(&numbers.runs));
-    page.finish()?;
-    Ok(numbers.not_exact())
-}
-
-fn facts(facts: &[Fact]) -> String {
-    let fact = |f: &Fact| format!("<dt>{}</dt><dd>{}</dd>", escaped(&f.key), escaped(&f.value));
-    facts.iter().map(fact).collect()
-}
-
-/// Speed against accuracy.
-fn tradeoffs(page: &mut Page, numbers: &Numbers) -> Result<()> {
-    let scenes = numbers.summaries(|family| family == ordinary::FAMILY);
-    let stress = numbers.summaries(|family| stress::Family::by_name(family).is_some());
-    page.section(
-        "Speed against accuracy",
-        "rays as a renderer has them, and rays that look for trouble",
-    );
-    page.figure(tradeoff::wrong(
-        "scenes",
-        "Ordinary rays: wrong answers over speed",
-        &scenes,
-        false,
-    )?)?;
-    page.figure(tradeoff::wrong(
-        "stress",
-        "All stress families: wrong answers over speed",
-        &stress,
-        false,
-    )?)?;
-    page.figure(tradeoff::t_error(
-        "t-error",
-        "Ordinary rays: the error of t over speed",
-        &scenes,
-    )?)?;
-    page.figure(tradeoff::t_error(
-        "t-error-stress",
-        "All stress families: the error of t over speed",
-        &stress,
-    )?)?;
-    let all: Vec<&Summary> = scenes.iter().filter(|s| s.name != AGAIN).collect();
-    page.table("Ordinary rays", &tradeoff::table(&all));
-    let all: Vec<&Summary> = stress.iter().filter(|s| s.name != AGAIN).collect();
-    page.table("All stress families", &tradeoff::table(&all));
-    page.section("Every run", "nothing is hidden by a mean");
-    page.figure(tradeoff::runs("runs", "Every run over Embree's beside it", &scenes)?)?;
-    page.section("Each stress family", "where methods fail");
-    failure_table(page, numbers);
-    page.open_gallery();
-    for family in &stress::ALL {
-        let summaries = numbers.summaries(|name| name == family.name);
-        // Without the reference there is no speed to show.
-        if summaries.iter().all(|summary| summary.speed.is_none()) {
-            continue;
-        }
-        let mut figure =
-            tradeoff::wrong(&format!("family-{}", family.name), family.name, &summaries, true)?;
-        figure.caption = sentence(family.about);
-        page.figure(figure)?;
-    }
-    page.close_gallery();
-    page.section("What failures look like", "one ray a square");
-    for picture in &pictures::ALL {
-        if let Some(figure) = failures::picture(picture, &numbers.squares)? {
-            page.figure(figure)?;
-        }
-    }
-    Ok(())
-}
-
-/// No more than a scene needs.
-fn needs(page: &mut Page, Numbers { builds, runs, .. }: &Numbers) -> Result<()> {
-    page.section(
-        "No more than a scene needs",
-        "what each structure costs, and what the automatic choice takes",
-    );
-    page.table("Structures by scene", &cost::table(builds, runs));
-    let methods: Vec<&str> = methods::all().iter().map(|method| method.name).collect();
-    page.table(
-        "Builds of all methods, the mean of the scenes",
-        &cost::builds_table(builds, &methods),
-    );
-    page.open_gallery();
-    for scene in cost::scenes(builds, structures::COSTS) {
-        page.figure(cost::break_even(builds, runs, scene)?)?;
-    }
-    page.close_gallery();
-    page.figure(cost::sizes(builds, runs)?)
-}
-
-/// How it grows.
-fn growing(page: &mut Page, Numbers { builds, runs, .. }: &Numbers) -> Result<()> {
-    page.section("Growth", "build, memory and rays, by triangles and by instances");
-    for (family, what) in
-        [(crate::growth::TRIANGLES, "triangle"), (crate::growth::INSTANCES, "instance")]
-    {
-        for measure in growth::MEASURES {
-            page.figure(growth::chart(builds, runs, family, what, measure)?)?;
-        }
-    }
-    Ok(())
-}
-
-/// A table of families by methods: wrong answers of so many.
-fn failure_table(page: &mut Page, numbers: &Numbers) {
-    let methods: Vec<_> = methods::all().into_iter().filter(|m| m.name != AGAIN).collect();
-    let mut lines = vec![vec!["family".to_owned()]];
-    lines[0].extend(methods.iter().map(|method| method.name.to_owned()));
-    for family in &stress::ALL {
-        let cell = |method: &methods::Method| {
-            let summary = Summary::of(method, &[], &numbers.judged, |name| name == family.name);
-            let tally = summary.tally;
-            match tally.asked + tally.gave_up {
-                0 => "-".to_owned(),
-                _ => {
-                    format!("{} of {}", tally.wrong() + tally.gave_up, tally.asked + tally.gave_up)
-                }
-            }
-        };
-        let mut line = vec![family.name.to_owned()];
-        line.extend(methods.iter().map(cell));
-        lines.push(line);
-    }
-    page.table("Wrong answers by family", &lines);
-}
 
 /// A page as it grows.
 pub struct Page<'a> {
@@ -200,7 +17,7 @@ pub struct Page<'a> {
 }
 
 impl<'a> Page<'a> {
-    fn new(out: &'a Path) -> Result<Self> {
+    pub fn new(out: &'a Path) -> Result<Self> {
         std::fs::create_dir_all(out.join("figures"))?;
         Ok(Page { out, body: String::new(), figures: 0 })
     }
@@ -211,16 +28,21 @@ impl<'a> Page<'a> {
         self.body.push('\n');
     }
 
+    pub fn paragraph(&mut self, words: &str) {
+        self.text(&format!("<p>{}</p>", escaped(words)));
+    }
+
     pub fn section(&mut self, title: &str, about: &str) {
         let about = escaped(&sentence(about));
         self.text(&format!("<h2>{}</h2>\n<p>{about}</p>", escaped(title)));
     }
 
-    fn open_gallery(&mut self) {
-        self.text("<div class=\"gallery\">");
+    /// Begins figures side by side, as the style's class of this name says.
+    pub fn open_gallery(&mut self, class: &str) {
+        self.text(&format!("<div class=\"{class}\">"));
     }
 
-    fn close_gallery(&mut self) {
+    pub fn close_gallery(&mut self) {
         self.text("</div>");
     }
 
@@ -255,7 +77,7 @@ impl<'a> Page<'a> {
         self.text(&(html + "</tbody></table></div></details>"));
     }
 
-    fn finish(self) -> Result<()> {
+    pub fn finish(self) -> Result<()> {
         let html = format!(
             "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
              content=\"width=device-width, initial-scale=1\">\n<title>raykern: speed against accuracy</title>\n\
@@ -283,12 +105,13 @@ fn scalable(svg: &str) -> String {
 }
 
 /// With a capital and a full stop.
-fn sentence(words: &str) -> String {
+pub fn sentence(words: &str) -> String {
     let mut letters = words.chars();
     let first = letters.next().map(|c| c.to_uppercase().to_string()).unwrap_or_default();
     format!("{first}{}.", letters.as_str())
 }
 
-fn escaped(text: &str) -> String {
+/// As HTML shows it.
+pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -17,13 +17,16 @@ use crate::rows::{self, Square};
 pub const SIDE: usize = 48;
 
 /// What became of a ray, as pictures show it.
-pub const OUTCOMES: [&str; 5] = [
+const OUTCOMES: [&str; 5] = [
     "right, hit",
     "right, nothing hit",
     "missed what is hit",
     "hit what is not",
     "another triangle",
 ];
+
+/// The same of a walk.
+const WALKED: [&str; 5] = ["every cell visited", "", "a cell skipped", "", ""];
 
 /// A picture before it is taken.
 pub struct Picture {
@@ -32,6 +35,8 @@ pub struct Picture {
     pub title: &'static str,
     /// Why it fails.
     pub about: &'static str,
+    /// What its squares' outcomes are called.
+    pub outcomes: [&'static str; 5],
     shot: Shot,
 }
 
@@ -51,6 +56,7 @@ pub const ALL: [Picture; 4] = [
         about: "A closed ball from inside, a window of a millionth of its radius around one vertex: whatever the direction, the ray \
                 hits. A test that decides each triangle by rounded numbers of its own lets rays through where triangles meet, which \
                 shows as bright dots in a picture.",
+        outcomes: OUTCOMES,
         shot: Shot::Scene {
             make: leak,
             methods: &["BVH", "Embree 3 robust", "Embree 3", "Moeller-Trumbore"],
@@ -61,6 +67,7 @@ pub const ALL: [Picture; 4] = [
         title: "Holes far from the origin",
         about: "A closed box 0.4 wide, 100,000 from the origin along each axis, where floats are 0.0078 apart, seen from 1 away. Boxes of its flat sides, tested as wall times reciprocal \
                 minus origin times reciprocal, lose what distinguishes the two products; and a plane's constant is rounded once for all.",
+        outcomes: OUTCOMES,
         shot: Shot::Scene {
             make: far,
             methods: &["BVH", "Embree 3 robust", "Embree 3", "Baldwin-Weber"],
@@ -71,6 +78,7 @@ pub const ALL: [Picture; 4] = [
         title: "The horizon of a sphere of radius 1e7",
         about: "The eye is 2 above the ground, the window a thousandth of a radian around the horizon. The discriminant of the \
                 quadratic is a small difference of large squares.",
+        outcomes: OUTCOMES,
         shot: Shot::Scene {
             make: horizon,
             methods: &["BVH", "BVH watertight", "Embree 3 robust", "Embree 3"],
@@ -82,6 +90,7 @@ pub const ALL: [Picture; 4] = [
         about: "A walk through 512 cells along each axis; a square is wrong if a cell in which the ray is for over a thousandth of a \
                 cell is never visited. The textbook walk adds up the times of walls, and its sums drift; ours has each from the wall's \
                 number. What lies in a cell that is skipped is not hit.",
+        outcomes: WALKED,
         shot: Shot::Walks { side: 512 },
     },
 ];

@@ -116,7 +116,7 @@ pub struct Square {
     pub method: String,
     pub x: usize,
     pub y: usize,
-    /// The number of one of [`crate::pictures::OUTCOMES`].
+    /// The number of one of the picture's outcomes.
     pub outcome: usize,
 }
 

@@ -31,7 +31,7 @@ impl Summary {
         let mut tally = Tally::default();
         let mine = judged.iter().filter(|row| row.method == method.name && wanted(&row.family));
         mine.for_each(|row| tally.merge(&row.tally()));
-        let cells = cells(method.name, runs, &wanted);
+        let cells = cells(method.name, REFERENCE, runs, &wanted);
         Summary {
             name: method.name,
             group: method.group,
@@ -49,14 +49,17 @@ impl Summary {
     }
 }
 
-/// Of each scene and kind, the runs with their ratios.
-type Cells = BTreeMap<(String, String, String), Vec<(usize, f64)>>;
+/// A family, a scene and a kind of ray.
+pub type Cell = (String, String, String);
+/// Of each, the runs with their ratios.
+pub type Cells = BTreeMap<Cell, Vec<(usize, f64)>>;
 
-fn cells(method: &str, runs: &[Run], wanted: impl Fn(&str) -> bool) -> Cells {
+/// Rays a second of a method over those of a reference, run by run.
+pub fn cells(method: &str, reference: &str, runs: &[Run], wanted: impl Fn(&str) -> bool) -> Cells {
     let cell = |run: &Run| (run.family.clone(), run.scene.clone(), run.kind.clone());
     let each = |run: &Run| run.seconds / run.rays.max(1) as f64;
     let reference: BTreeMap<_, f64> = (runs.iter())
-        .filter(|run| run.method == REFERENCE)
+        .filter(|run| run.method == reference && wanted(&run.family))
         .map(|run| ((cell(run), run.run), each(run)))
         .collect();
     let mut cells = Cells::new();

@@ -161,11 +161,13 @@ mod tests {
         answer(&request, &methods, &mut out).unwrap();
         let text = String::from_utf8(out).unwrap();
         let case = Case::of(&Family::by_name("ordinary").unwrap(), 0);
-        let asked: usize = methods[1..].iter().map(|method| case.asked(method).len()).sum();
+        // Those that are at hand.
+        let built = || methods[1..].iter().filter(|method| method.build(&case.model).is_ok());
+        let asked: usize = built().map(|method| case.asked(method).len()).sum();
         let answers = text.lines().filter(|line| parse_hit(line).is_some()).count();
         assert_eq!(answers, asked);
         assert!(text.ends_with("end\n") && !text.contains("start 0\n"));
         let timed = text.lines().filter(|line| line.starts_with("time ")).count();
-        assert_eq!(timed, 2 * (methods.len() - 1));
+        assert_eq!(timed, 2 * built().count());
     }
 }

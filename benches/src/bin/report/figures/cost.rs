@@ -6,7 +6,7 @@ use anyhow::Result;
 use raykern_harness::chart::plot::{Axis, Plot, Point, Scale, Series};
 use raykern_harness::stats::median;
 
-use super::{Figure, lines, number};
+use super::{Figure, lines, number, style};
 use crate::ordinary::FAMILY;
 use crate::rows::{Build, Run};
 use crate::structures::{ALL, AUTOMATIC, COSTS, SIZES};
@@ -138,9 +138,9 @@ pub fn break_even(builds: &[Build], runs: &[Run], scene: &str) -> Result<Figure>
     // It would flatten all other lines.
     all.retain(|(name, _)| *name != "list" && !AUTOMATIC.contains(name));
     let steps = (0..=20).map(|i| 10f64.powf(f64::from(i) / 5.0 - 2.0));
-    let series = all.iter().enumerate().map(|(style, (name, cost))| Series {
+    let series = all.iter().map(|(name, cost)| Series {
         name: (*name).to_owned(),
-        style,
+        style: style(name),
         points: steps.clone().map(|rays| Point::bare(rays, 1e9 * cost.total(rays))).collect(),
         joined: true,
     });
@@ -150,7 +150,7 @@ pub fn break_even(builds: &[Build], runs: &[Run], scene: &str) -> Result<Figure>
         y: Axis::new("ns a triangle, build and rays", Scale::Log),
         series: series.collect(),
         front: Vec::new(),
-        size: (720, 460),
+        size: (560, 420),
     };
     let row = |(name, cost): &(&str, Cost)| {
         let from = [0.01, 0.1, 1.0, 10.0, 100.0].map(|rays| number(1e9 * cost.total(rays)));
@@ -164,17 +164,21 @@ pub fn break_even(builds: &[Build], runs: &[Run], scene: &str) -> Result<Figure>
 /// Who is cheapest from how many rays on.
 fn pays(all: &[(&str, Cost)]) -> String {
     let mut words: Vec<String> = Vec::new();
-    let mut last = "";
+    let mut last: Option<&(&str, Cost)> = None;
     for rays in (0..=200).map(|i| 10f64.powf(f64::from(i) / 40.0 - 3.0)) {
         let cheapest = all.iter().min_by(|a, b| a.1.total(rays).total_cmp(&b.1.total(rays)));
-        let Some((name, _)) = cheapest else { continue };
-        if *name != last {
-            words.push(match last {
-                "" => format!("{name} at first"),
-                _ => format!("{name} from {} rays a triangle on", number(rays)),
-            });
-            last = name;
+        let Some(now) = cheapest else { continue };
+        match last {
+            None => words.push(format!("{} at first", now.0)),
+            Some(before) if before.0 != now.0 => {
+                // Where the lines cross, close below this number of rays.
+                let dearer = now.1.total(0.0) - before.1.total(0.0);
+                let from = dearer / (before.1.ray - now.1.ray);
+                words.push(format!("{} from {} rays a triangle on", now.0, number(from)));
+            }
+            _ => {}
         }
+        last = cheapest;
     }
     words.join(", ") + "."
 }
@@ -187,9 +191,9 @@ pub fn sizes(builds: &[Build], runs: &[Run]) -> Result<Figure> {
         Some(Point::bare(cost.count as f64, 1e9 * cost.ray))
     };
     let scenes = scenes(builds, SIZES);
-    let series = all.enumerate().map(|(style, (name, _))| Series {
+    let series = all.map(|(name, _)| Series {
         name: (*name).to_owned(),
-        style,
+        style: style(name),
         points: scenes.iter().filter_map(|scene| point(scene, name)).collect(),
         joined: true,
     });

@@ -4,7 +4,7 @@ use anyhow::Result;
 use raykern_harness::chart::tiles::{Panel, Tiles};
 
 use super::{Figure, lines};
-use crate::pictures::{OUTCOMES, Picture, SIDE};
+use crate::pictures::{Picture, SIDE};
 use crate::rows::Square;
 
 /// One of them, as far as it was taken.
@@ -20,10 +20,11 @@ pub fn picture(picture: &Picture, squares: &[Square]) -> Result<Option<Figure>> 
         kinds: part.iter().map(|square| square.outcome).collect(),
     };
     let seen = |outcome: &usize| mine.iter().any(|square| square.outcome == *outcome);
-    let last = (0..OUTCOMES.len()).filter(seen).max().unwrap_or(0);
+    let named = |i: usize| if seen(&i) { picture.outcomes[i].to_owned() } else { String::new() };
+    let legend = (0..picture.outcomes.len()).map(named).collect();
     let tiles = Tiles {
         title: picture.title.to_owned(),
-        legend: OUTCOMES[..=last].iter().map(|name| (*name).to_owned()).collect(),
+        legend,
         panels: parts.iter().map(panel).collect(),
         columns: SIDE,
     };
@@ -35,10 +36,10 @@ pub fn picture(picture: &Picture, squares: &[Square]) -> Result<Option<Figure>> 
     );
     let row = |part: &&[&Square]| {
         let count = |outcome| part.iter().filter(|s| s.outcome == outcome).count().to_string();
-        let counts = (0..OUTCOMES.len()).map(count);
+        let counts = (0..picture.outcomes.len()).map(count);
         std::iter::once(part[0].method.clone()).chain(counts).collect()
     };
-    let head: Vec<&str> = std::iter::once("method").chain(OUTCOMES).collect();
+    let head: Vec<&str> = std::iter::once("method").chain(picture.outcomes).collect();
     let table = lines(&head, parts.iter().map(row));
     Figure::new(picture.name, tiles.svg(), caption, table).map(Some)
 }

@@ -44,16 +44,34 @@ impl Figure {
     }
 }
 
+/// The number of the colour and shape that a structure has in every figure.
+pub fn style(structure: &str) -> usize {
+    let known = ["list", "BVH", "nested grid", "binary BVH", "plain grid", "BVH fast"];
+    match structure {
+        crate::methods::REFERENCE => 0,
+        _ => known.iter().position(|name| *name == structure).unwrap_or(6),
+    }
+}
+
 /// The lines of a table.
 pub fn lines(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Vec<Vec<String>> {
     let head = head.iter().map(|name| (*name).to_owned()).collect();
     std::iter::once(head).chain(rows).collect()
 }
 
+/// A whole number in groups of three digits.
+pub fn grouped(x: f64) -> String {
+    let plain = format!("{x:.0}");
+    let place = |i: usize| i > 0 && (plain.len() - i).is_multiple_of(3);
+    let digits = plain.chars().enumerate();
+    digits.flat_map(|(i, digit)| place(i).then_some(',').into_iter().chain([digit])).collect()
+}
+
 /// A number for a table.
 pub fn number(x: f64) -> String {
     match x.abs() {
         0.0 => "0".to_owned(),
+        size if (9999.5..1e12).contains(&size) => grouped(x),
         size if (0.01..1e6).contains(&size) => {
             let digits = (2 - size.log10().floor() as i32).clamp(0, 4) as usize;
             format!("{x:.digits$}")

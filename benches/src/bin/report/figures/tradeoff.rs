@@ -7,7 +7,9 @@ use raykern_harness::stats::{median, median_interval};
 
 use super::{Figure, lines, number};
 use crate::methods::{AGAIN, Group, REFERENCE};
-use crate::summary::{Summary, front};
+use crate::ordinary::FAMILY;
+use crate::rows::Run;
+use crate::summary::{Cell, Summary, cells, front};
 
 const SPEED: &str = "rays a second, one thread, over those of Embree 3 by default";
 
@@ -107,6 +109,33 @@ pub fn runs(name: &str, title: &str, summaries: &[Summary]) -> Result<Figure> {
     Figure::new(name, chart.svg(), caption, table)
 }
 
+/// A method over itself, each scene and kind a row: what a ratio of one looks like here.
+pub fn noise(runs: &[Run]) -> Result<Figure> {
+    let cells = cells(AGAIN, "BVH", runs, |family| family == FAMILY);
+    let row = |((_, scene, kind), ratios): (&Cell, &Vec<(usize, f64)>)| {
+        let values: Vec<f64> = ratios.iter().map(|ratio| ratio.1).collect();
+        let middle = Some((median(&values)?, median_interval(&values)?));
+        Some(Row { name: format!("{scene}, {kind}"), style: 1, values, middle })
+    };
+    let rows: Vec<Row> = cells.iter().filter_map(row).collect();
+    let numbers =
+        rows.iter().flat_map(|row| row.values.iter().map(|v| vec![row.name.clone(), number(*v)]));
+    let table = lines(&["scene and kind", "ratio"], numbers);
+    let runs = rows.first().map_or(0, |row| row.values.len());
+    let chart = Rows {
+        title: "The noise of this machine: the same method against itself".to_owned(),
+        axis: Axis::new("rays a second of the BVH, asked again, over its own", Scale::Log),
+        rows,
+        reference: Some(1.0),
+        width: 1000,
+    };
+    let caption = format!(
+        "Two turns of one method in each of {runs} rounds; whatever differs from one is noise. Bars are medians with bootstrap \
+         intervals of 95 %."
+    );
+    Figure::new("noise", chart.svg(), caption, table)
+}
+
 fn by_group(shown: &[&Summary], point: impl Fn(&Summary) -> Option<Point>) -> Vec<Series> {
     let series = |group: Group| Series {
         name: group.name().to_owned(),
@@ -153,7 +182,9 @@ pub fn table(shown: &[&Summary]) -> Vec<Vec<String>> {
         let t = &s.tally;
         let mut line = vec![s.name.to_owned()];
         line.extend(speed.unwrap_or_else(none));
-        line.extend([t.asked, t.false_misses, t.false_hits, t.wrong_prims].map(|n| n.to_string()));
+        line.extend(
+            [t.asked, t.false_misses, t.false_hits, t.wrong_prims].map(|n| number(n as f64)),
+        );
         line.extend(wrong.unwrap_or_else(none));
         line.extend([ulps(0.5), ulps(0.99), ulps(1.0)]);
         line.extend([t.not_exact, t.gave_up].map(|n| n.to_string()));
