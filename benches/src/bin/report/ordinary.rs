@@ -1,5 +1,7 @@
 //! Rays as a renderer has them, in scenes of ordinary size: how fast, and how often wrong.
 
+use std::collections::BTreeSet;
+
 use anyhow::Result;
 use clap::Parser;
 use raykern::{Hit, Layout, Ray};
@@ -36,8 +38,9 @@ pub fn measure(options: &Options) -> Result<()> {
         eprintln!("  {name}");
         judged.extend(measure_scene(&name, &scene, options, &mut measured)?);
     }
-    let ours = |family: &str| [FAMILY, SAMPLE].contains(&family);
-    rows::replace(options.data(), judged, |row: &Judged| ours(&row.family))?;
+    let scenes: BTreeSet<String> = judged.iter().map(|row| row.scene.clone()).collect();
+    let ours = |row: &Judged| [FAMILY, SAMPLE].contains(&row.family.as_str());
+    rows::replace(options.data(), judged, |row| ours(row) && scenes.contains(&row.scene))?;
     measured.replace(options, FAMILY)
 }
 

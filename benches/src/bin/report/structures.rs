@@ -1,5 +1,8 @@
 //! What each structure of ours costs: memory, build and rays, over scenes and over soups of a few triangles.
 
+use std::collections::BTreeSet;
+use std::rc::Rc;
+
 use anyhow::{Result, anyhow};
 use raykern::{GridKind, Kind as Took, OwnedAccel, Quality, Ray};
 use raykern_bench::lineup::Tracer;
@@ -9,7 +12,6 @@ use raykern_bench::watch::thread_seconds;
 use raykern_harness::make;
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker as Maker};
-use std::rc::Rc;
 
 use crate::methods::Structure;
 use crate::options::Options;
@@ -84,10 +86,12 @@ pub fn measure_sizes(options: &Options) -> Result<()> {
 }
 
 impl Measured {
-    /// Puts these in the place of what was measured under the name before.
+    /// Puts these in the place of what was measured before under the name, over the same scenes.
     pub fn replace(self, options: &Options, family: &str) -> Result<()> {
-        rows::replace(options.data(), self.builds, |row: &Build| row.family == family)?;
-        rows::replace(options.data(), self.runs, |row: &Run| row.family == family)
+        let scenes: BTreeSet<String> = self.runs.iter().map(|run| run.scene.clone()).collect();
+        let old = |of: &str, scene: &str| of == family && scenes.contains(scene);
+        rows::replace(options.data(), self.builds, |row: &Build| old(&row.family, &row.scene))?;
+        rows::replace(options.data(), self.runs, |row: &Run| old(&row.family, &row.scene))
     }
 }
 
