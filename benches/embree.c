@@ -33,7 +33,9 @@ static bool on_memory(void *user, ssize_t bytes, bool post)
     return true;
 }
 
-BenchEmbree *bench_embree_new(const char *config, int quality, int robust)
+int bench_embree_version(void) { return RTC_VERSION; }
+
+BenchEmbree *bench_embree_new(const char *config, int quality, int flags)
 {
     BenchEmbree *e = calloc(1, sizeof *e);
     if (!e) return NULL;
@@ -51,7 +53,7 @@ BenchEmbree *bench_embree_new(const char *config, int quality, int robust)
                                 : RTC_BUILD_QUALITY_HIGH;
     e->scene = rtcNewScene(e->device);
     rtcSetSceneBuildQuality(e->scene, e->quality);
-    rtcSetSceneFlags(e->scene, robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    rtcSetSceneFlags(e->scene, (enum RTCSceneFlags)flags);
     return e;
 }
 
@@ -69,6 +71,18 @@ int bench_embree_mesh(BenchEmbree *e, const float *vertices, size_t vertex_count
     rtcCommitGeometry(mesh);
     rtcAttachGeometry(e->scene, mesh);
     rtcReleaseGeometry(mesh);
+    return rtcGetDeviceError(e->device) != RTC_ERROR_NONE;
+}
+
+int bench_embree_spheres(BenchEmbree *e, const float *spheres, size_t count)
+{
+    RTCGeometry set = rtcNewGeometry(e->device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
+    void *v = rtcSetNewGeometryBuffer(set, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, 16, count);
+    if (count) memcpy(v, spheres, 16 * count);
+    rtcSetGeometryBuildQuality(set, e->quality);
+    rtcCommitGeometry(set);
+    rtcAttachGeometry(e->scene, set);
+    rtcReleaseGeometry(set);
     return rtcGetDeviceError(e->device) != RTC_ERROR_NONE;
 }
 

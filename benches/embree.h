@@ -16,12 +16,16 @@ typedef struct { float t, u, v; uint32_t prim, geometry, instance; } BenchHit;
 typedef struct BenchEmbree BenchEmbree;
 typedef struct BenchBatch BenchBatch;
 
+/* The version whose header this was compiled with, such as 31305. */
+int bench_embree_version(void);
 /* A device of one thread. `config` is appended to its settings; `quality` is 0 low, 1 medium,
- * 2 high. Null when the device cannot be had. */
-BenchEmbree *bench_embree_new(const char *config, int quality, int robust);
+ * 2 high; `flags` are those of a scene. Null when the device cannot be had. */
+BenchEmbree *bench_embree_new(const char *config, int quality, int flags);
 /* Copies a mesh into buffers of Embree's own, padded as its loads need. */
 int bench_embree_mesh(BenchEmbree *, const float *vertices, size_t vertex_count,
                       const uint32_t *indices, size_t triangle_count);
+/* Copies spheres, each x y z radius. */
+int bench_embree_spheres(BenchEmbree *, const float *spheres, size_t count);
 /* Before the mesh: it will move, and is followed by refitting or by building anew. */
 void bench_embree_moving(BenchEmbree *, int refit);
 /* Copies other places for the vertices of the first mesh. */

@@ -19,7 +19,8 @@ struct RawScene([u8; 0]);
 struct RawBatch([u8; 0]);
 
 unsafe extern "C" {
-    fn bench_embree_new(config: *const c_char, quality: c_int, robust: c_int) -> *mut RawScene;
+    fn bench_embree_version() -> c_int;
+    fn bench_embree_new(config: *const c_char, quality: c_int, flags: c_int) -> *mut RawScene;
     fn bench_embree_mesh(
         scene: *mut RawScene,
         vertices: *const f32,
@@ -27,6 +28,7 @@ unsafe extern "C" {
         indices: *const u32,
         triangle_count: usize,
     ) -> c_int;
+    fn bench_embree_spheres(scene: *mut RawScene, spheres: *const f32, count: usize) -> c_int;
     fn bench_embree_moving(scene: *mut RawScene, refit: c_int);
     fn bench_embree_move(scene: *mut RawScene, vertices: *const f32, vertex_count: usize);
     fn bench_embree_instance(scene: *mut RawScene, maps: *const f32, count: usize) -> c_int;
@@ -44,10 +46,28 @@ unsafe extern "C" {
 }
 
 /// How a scene is built.
+#[derive(Clone, Copy)]
+pub struct Way {
+    /// 0 low, 1 medium, 2 high.
+    pub quality: c_int,
+    /// Of the scene: [`PLAIN`], [`COMPACT`], [`ROBUST`].
+    pub flags: c_int,
+    /// Settings of the device.
+    pub config: &'static CStr,
+}
+
+/// No flag.
+pub const PLAIN: c_int = 0;
+/// `RTC_SCENE_FLAG_COMPACT`.
+pub const COMPACT: c_int = 2;
+/// `RTC_SCENE_FLAG_ROBUST`.
+pub const ROBUST: c_int = 4;
+
+/// How it takes part in the comparison.
 struct Setup {
     name: &'static str,
     quality: c_int,
-    robust: bool,
+    flags: c_int,
     single: Class,
     /// The classes of streams, and of packets and streams with the coherent flag; `None` to leave them out.
     batch: Option<[Class; 2]>,
@@ -57,30 +77,30 @@ const SETUPS: [Setup; 4] = [
     Setup {
         name: "embree",
         quality: 1,
-        robust: false,
+        flags: PLAIN,
         single: Class::Embree,
         batch: Some([Class::EmbreeStream, Class::EmbreePackets]),
     },
     Setup {
         name: "embree-robust",
         quality: 1,
-        robust: true,
+        flags: ROBUST,
         single: Class::EmbreeRobust,
         batch: Some([Class::EmbreeRobustBatch; 2]),
     },
-    Setup {
-        name: "embree-high",
-        quality: 2,
-        robust: false,
-        single: Class::EmbreeHigh,
-        batch: None,
-    },
-    Setup { name: "embree-low", quality: 0, robust: false, single: Class::EmbreeLow, batch: None },
+    Setup { name: "embree-high", quality: 2, flags: PLAIN, single: Class::EmbreeHigh, batch: None },
+    Setup { name: "embree-low", quality: 0, flags: PLAIN, single: Class::EmbreeLow, batch: None },
 ];
 
 /// What follows the name, and the device's settings. On some processors Embree is faster without
 /// the widest vectors.
 const DEVICES: [(&str, &CStr); 2] = [("", c""), ("-avx2", c"isa=avx2")];
+
+impl Setup {
+    fn on(&self, config: &'static CStr) -> Way {
+        Way { quality: self.quality, flags: self.flags, config }
+    }
+}
 
 /// Adds every setup on every device.
 pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) {
@@ -90,7 +110,7 @@ pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) {
             if !options.wants_peer(&name) {
                 continue;
             }
-            let (scene, seconds) = timed_scene(model, config, setup);
+            let (scene, seconds) = timed_scene(model, setup.on(config));
             let Some(scene) = scene else {
                 lineup.notes.push(format!("{name}: Embree refused"));
                 continue;
@@ -115,7 +135,8 @@ pub fn join_instances(lineup: &mut Lineup, model: &Model, maps: &[[f32; 12]], op
             if !options.wants_peer(&name) {
                 continue;
             }
-            let Some((scene, seconds, bytes)) = Scene::instanced(model, maps, config, setup) else {
+            let Some((scene, seconds, bytes)) = Scene::instanced(model, maps, setup.on(config))
+            else {
                 lineup.notes.push(format!("{name}: Embree refused"));
                 continue;
             };
@@ -137,17 +158,42 @@ fn add_batches(lineup: &mut Lineup, name: &str, [streams, packets]: [Class; 2], 
     }
 }
 
+/// Embree's version, as its header says.
+pub fn version() -> String {
+    // SAFETY: it returns a constant.
+    let number = unsafe { bench_embree_version() };
+    format!("{}.{}.{}", number / 10_000, number / 100 % 100, number % 100)
+}
+
+/// One scene, asked one ray at a time, with the seconds of its build and its bytes; `None` when Embree refuses.
+pub fn single(model: &Model, way: Way) -> Option<(Box<dyn Tracer>, f64, usize)> {
+    let (scene, seconds) = timed_scene(model, way);
+    let scene = scene?;
+    let bytes = scene.bytes();
+    Some((Box::new(Single(Rc::new(scene))), seconds, bytes))
+}
+
+/// The same over instances of `model`; seconds and bytes are of what is over the model.
+pub fn single_instances(
+    model: &Model,
+    maps: &[[f32; 12]],
+    way: Way,
+) -> Option<(Box<dyn Tracer>, f64, usize)> {
+    let (scene, seconds, bytes) = Scene::instanced(model, maps, way)?;
+    Some((Box::new(Single(Rc::new(scene))), seconds, bytes))
+}
+
 /// Only the commit is timed: meshes are copied before.
-fn timed_scene(model: &Model, config: &CStr, setup: &Setup) -> (Option<Scene>, f64) {
+fn timed_scene(model: &Model, way: Way) -> (Option<Scene>, f64) {
     let mut commits = Vec::new();
     let (scene, _) = timed_build(|| {
-        let scene = Scene::new(model, config, setup)?;
+        let scene = Scene::new(model, way)?;
         let mut watch = Watch::new();
         let failed = watch.time(|| scene.commit());
         commits.push(watch.take().seconds);
         (!failed).then_some(scene)
     });
-    (scene, crate::watch::median(&mut commits))
+    (scene, crate::watch::median(&commits))
 }
 
 /// Every way to follow one mesh that moves, by name. Like the others, each is timed without the copying of vertices.
@@ -185,16 +231,16 @@ impl Follower for Scene {
 struct Scene(*mut RawScene);
 
 impl Scene {
-    fn new(model: &Model, config: &CStr, setup: &Setup) -> Option<Self> {
+    fn new(model: &Model, Way { quality, flags, config }: Way) -> Option<Self> {
         // SAFETY: the string ends with a zero.
-        let raw = unsafe { bench_embree_new(config.as_ptr(), setup.quality, setup.robust.into()) };
+        let raw = unsafe { bench_embree_new(config.as_ptr(), quality, flags) };
         (!raw.is_null()).then_some(Scene(raw))?.with_meshes(model)
     }
 
     /// For a model that moves.
     fn followed(model: &Model, config: &CStr, refit: Option<bool>) -> Option<Self> {
         // SAFETY: the string ends with a zero.
-        let raw = unsafe { bench_embree_new(config.as_ptr(), 0, 0) };
+        let raw = unsafe { bench_embree_new(config.as_ptr(), 0, PLAIN) };
         let scene = (!raw.is_null()).then_some(Scene(raw))?;
         if let Some(refit) = refit {
             // SAFETY: the scene exists.
@@ -205,13 +251,8 @@ impl Scene {
     }
 
     /// Over instances of a model; with the seconds and the bytes that what is over the model takes, built anew as for a frame.
-    fn instanced(
-        model: &Model,
-        maps: &[[f32; 12]],
-        config: &CStr,
-        setup: &Setup,
-    ) -> Option<(Self, f64, usize)> {
-        let scene = Scene::new(model, config, setup).filter(|scene| !scene.commit())?;
+    fn instanced(model: &Model, maps: &[[f32; 12]], way: Way) -> Option<(Self, f64, usize)> {
+        let scene = Scene::new(model, way).filter(|scene| !scene.commit())?;
         let below = scene.bytes();
         let (numbers, count) = (maps.as_flattened().as_ptr(), maps.len());
         // SAFETY: the scene is built, and there are that many maps.
@@ -241,6 +282,14 @@ impl Scene {
                     indices.len() / 3,
                 )
             };
+            if failed != 0 {
+                return None;
+            }
+        }
+        for set in &model.sphere_sets {
+            // SAFETY: the count is that of the slice.
+            let failed =
+                unsafe { bench_embree_spheres(self.0, set.as_flattened().as_ptr(), set.len()) };
             if failed != 0 {
                 return None;
             }

@@ -131,7 +131,12 @@ impl Lineup {
 
     /// Adds a method.
     pub fn add(&mut self, name: impl Into<String>, class: Class, tracer: impl Tracer + 'static) {
-        self.subjects.push(Subject { name: name.into(), class, tracer: Box::new(tracer) });
+        self.add_boxed(name, class, Box::new(tracer));
+    }
+
+    /// The same with a tracer in a box.
+    pub fn add_boxed(&mut self, name: impl Into<String>, class: Class, tracer: Box<dyn Tracer>) {
+        self.subjects.push(Subject { name: name.into(), class, tracer });
     }
 
     /// Adds what a build cost.

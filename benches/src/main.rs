@@ -3,29 +3,12 @@
 //! `cargo run --release -p raykern-bench --features embree,peers -- --help`; what the numbers mean
 //! is in docs/SPEED.md.
 
-mod c_face;
-mod check;
-#[cfg(feature = "embree")]
-mod embree;
-mod instances;
-mod lineup;
-mod measure;
-mod motion;
-mod options;
-mod ours;
-#[cfg(feature = "peers")]
-mod peers;
-mod ratios;
-mod rays;
-mod report;
-mod scenes;
-mod watch;
-
 use anyhow::{Context, Result};
 use clap::Parser;
 
-use crate::options::Options;
-use crate::watch::Watch;
+use raykern_bench::options::Options;
+use raykern_bench::watch::Watch;
+use raykern_bench::{instances, measure, motion, ratios, report, scenes, watch};
 
 fn main() -> Result<()> {
     let options = Options::parse();

@@ -62,14 +62,14 @@ impl MethodResult {
 
     /// The median of the seconds; `None` when not measured.
     pub fn median_seconds(&self) -> Option<f64> {
-        (!self.runs.is_empty()).then(|| median(&mut self.seconds()))
+        (!self.runs.is_empty()).then(|| median(&self.seconds()))
     }
 
     /// The median of an event; `None` when not counted.
     pub fn median_event(&self, event: usize) -> Option<f64> {
         let counted: Option<Vec<f64>> =
             self.runs.iter().map(|cost| cost.events.map(|events| events[event])).collect();
-        counted.filter(|all| !all.is_empty()).map(|mut all| median(&mut all))
+        counted.filter(|all| !all.is_empty()).map(|all| median(&all))
     }
 }
 

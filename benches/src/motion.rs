@@ -71,10 +71,10 @@ fn measure(case: &Case, mut scene: Loaded, options: &Options) -> Result<()> {
     }
     println!("  {:<28}{:>10}{:>14}{:>14}", "", "ms", "rays, first", "rays, last");
     for ((name, _), seconds) in followers.iter().zip(&seconds) {
-        let mut updates: Vec<f64> = seconds.iter().map(|[update, _]| 1e3 * update).collect();
+        let updates: Vec<f64> = seconds.iter().map(|[update, _]| 1e3 * update).collect();
         let rays = |frame: usize| 1e-6 * options.ray_count() as f64 / seconds[frame][1];
         let (first, last) = (rays(0), rays(FRAMES - 1));
-        println!("  {name:<28}{:>10.2}{first:>14.2}{last:>14.2}", median(&mut updates));
+        println!("  {name:<28}{:>10.2}{first:>14.2}{last:>14.2}", median(&updates));
     }
     println!();
     Ok(())

@@ -84,13 +84,14 @@ pub fn add_instances(
 }
 
 /// One call a ray.
-struct Single {
+pub struct Single {
     accel: Rc<OwnedAccel<'static>>,
     options: QueryOptions,
 }
 
 impl Single {
-    fn new(accel: &Rc<OwnedAccel<'static>>, precision: Precision) -> Self {
+    /// Asks `accel`.
+    pub fn new(accel: &Rc<OwnedAccel<'static>>, precision: Precision) -> Self {
         let options = QueryOptions { precision, ..QueryOptions::default() };
         Single { accel: accel.clone(), options }
     }

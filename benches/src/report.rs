@@ -22,7 +22,7 @@ pub fn machine(core: Option<usize>, options: &Options) {
 }
 
 /// The processor's name, where the system tells.
-fn processor() -> String {
+pub fn processor() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = info.lines().find(|line| line.starts_with("model name"));
     let name = model.and_then(|line| line.split(": ").nth(1));

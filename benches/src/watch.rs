@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use raykern_harness::stats;
+
 /// What one timed piece of work cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
@@ -61,18 +63,14 @@ pub fn timed_build<T>(mut build: impl FnMut() -> T) -> (T, f64) {
         let built = build();
         seconds.push(thread_seconds() - started);
         if seconds.len() == 3 || begun.elapsed().as_secs_f64() > 1.0 {
-            return (built, median(&mut seconds));
+            return (built, median(&seconds));
         }
     }
 }
 
 /// The median, of an even number the mean of the middle two; zero of none.
-pub fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => 0.0,
-        n => 0.5 * (values[(n - 1) / 2] + values[n / 2]),
-    }
+pub fn median(values: &[f64]) -> f64 {
+    stats::median(values).unwrap_or(0.0)
 }
 
 /// Processor time of this thread: what others on the core take is not in it.
@@ -172,9 +170,9 @@ mod tests {
 
     #[test]
     fn medians() {
-        assert_eq!(median(&mut []), 0.0);
-        assert_eq!(median(&mut [3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), 2.5);
+        assert_eq!(median(&[]), 0.0);
+        assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
+        assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 pub mod assembly;
 pub mod chart;
+pub mod fit;
 pub mod load;
 pub mod make;
 pub mod model;
@@ -13,3 +14,4 @@ pub mod search;
 pub mod shared_scenes;
 pub mod stats;
 pub mod stress;
+pub mod textbook;

@@ -28,34 +28,55 @@ pub trait Library: Sized + 'static {
     fn any(&self, ray: &Ray) -> bool;
 }
 
-/// Adds every library.
+/// A library over one scene, with the bytes it keeps when they can be told.
+pub type Built = (Box<dyn Tracer>, Option<usize>);
+
+/// A library by name, and what builds it.
+pub struct Maker {
+    /// The name in tables.
+    pub name: &'static str,
+    /// Builds it; the reason when it refuses.
+    pub build: fn(&Model) -> Result<Built, String>,
+}
+
+/// Every library.
+pub fn all() -> Vec<Maker> {
+    vec![
+        maker::<obvhs::Medium>("obvhs"),
+        maker::<obvhs::Slow>("obvhs-slow"),
+        maker::<bvh::Tree>("bvh-crate"),
+        maker::<parry::Mesh>("parry"),
+        #[cfg(target_feature = "avx2")]
+        maker::<tinybvh::Fast>("tinybvh"),
+        #[cfg(target_feature = "avx2")]
+        maker::<tinybvh::HighQuality>("tinybvh-hq"),
+    ]
+}
+
+fn maker<L: Library>(name: &'static str) -> Maker {
+    let build = |model: &Model| {
+        let library = L::build(model)?;
+        let bytes = library.bytes();
+        Ok((Box::new(Peer(library)) as Box<dyn Tracer>, bytes))
+    };
+    Maker { name, build }
+}
+
+/// Adds every library that is wanted.
 pub fn join(lineup: &mut Lineup, model: &Model, options: &Options) {
-    join_one::<obvhs::Medium>("obvhs", lineup, model, options);
-    join_one::<obvhs::Slow>("obvhs-slow", lineup, model, options);
-    join_one::<bvh::Tree>("bvh-crate", lineup, model, options);
-    join_one::<parry::Mesh>("parry", lineup, model, options);
-    #[cfg(target_feature = "avx2")]
-    {
-        join_one::<tinybvh::Fast>("tinybvh", lineup, model, options);
-        join_one::<tinybvh::HighQuality>("tinybvh-hq", lineup, model, options);
+    for Maker { name, build } in all().iter().filter(|maker| options.wants_peer(maker.name)) {
+        match timed_build(|| build(model)) {
+            (Ok((tracer, bytes)), seconds) => {
+                lineup.built(*name, seconds, bytes);
+                lineup.add_boxed(*name, Class::RustPeer, tracer);
+            }
+            (Err(reason), _) => lineup.notes.push(format!("{name}: {reason}")),
+        }
     }
     #[cfg(not(target_feature = "avx2"))]
     if options.wants_peer("tinybvh") {
         let flags = "RUSTFLAGS=-Ctarget-cpu=native";
         lineup.notes.push(format!("tinybvh: its fast form needs {flags}"));
-    }
-}
-
-fn join_one<L: Library>(name: &str, lineup: &mut Lineup, model: &Model, options: &Options) {
-    if !options.wants_peer(name) {
-        return;
-    }
-    match timed_build(|| L::build(model)) {
-        (Ok(library), seconds) => {
-            lineup.built(name, seconds, library.bytes());
-            lineup.add(name, Class::RustPeer, Peer(library));
-        }
-        (Err(reason), _) => lineup.notes.push(format!("{name}: {reason}")),
     }
 }
 

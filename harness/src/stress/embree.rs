@@ -93,14 +93,16 @@ fn within_range(numbers: &[f32]) -> bool {
     numbers.iter().all(|x| x.abs() <= LARGEST)
 }
 
-fn may_be_asked(shot: &Shot) -> bool {
+/// Whether Embree takes the ray: no options, nothing that is not finite or beyond 1.8e18, no negative limits.
+pub fn may_be_asked(shot: &Shot) -> bool {
     let Ray { origin, t_min, direction, t_max } = shot.ray;
     let plain = shot.options == QueryOptions::default();
     let limits = (0.0..f32::INFINITY).contains(&t_min) && t_min <= t_max;
     plain && limits && direction != [0.0; 3] && within_range(&origin) && within_range(&direction)
 }
 
-fn may_be_built(scenery: &Scenery) -> bool {
+/// Whether Embree takes the scene: likewise, and no sphere without a radius.
+pub fn may_be_built(scenery: &Scenery) -> bool {
     let mut meshes = scenery.model.meshes.iter();
     let mut spheres = scenery.model.sphere_sets.iter().flatten();
     meshes.all(|mesh| within_range(mesh.vertices.as_flattened()))

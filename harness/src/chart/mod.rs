@@ -1,11 +1,19 @@
-//! A chart of times with error bars, as SVG.
+//! Charts as SVG: times with error bars here, marks and lines over two axes in [`plot`], rows of single runs in [`rows`], small
+//! pictures in [`tiles`].
+
+mod axis;
+mod draw;
+pub mod plot;
+pub mod rows;
+pub mod tiles;
 
 use std::path::Path;
 
 use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::HPos;
 
 use crate::stats::Summary;
+use draw::{Area, COLORS, DrawError, FAINT, digits, label, mark, write_text};
 
 /// One measured series: a name, and for each row a summary or nothing.
 pub struct Series {
@@ -29,12 +37,6 @@ pub struct Chart {
     pub series: Vec<Series>,
 }
 
-/// Colours that remain apart for every kind of colour vision (Okabe and Ito).
-const COLORS: [RGBColor; 3] = [RGBColor(213, 94, 0), RGBColor(0, 114, 178), RGBColor(0, 158, 115)];
-const INK: RGBColor = RGBColor(40, 40, 40);
-const FAINT: RGBColor = RGBColor(222, 222, 222);
-const FONT: &str = "sans-serif";
-
 const WIDTH: u32 = 1000;
 const LEFT: u32 = 190;
 const RIGHT: u32 = 90;
@@ -45,14 +47,8 @@ const BOTTOM: u32 = 80;
 impl Chart {
     /// The chart as SVG text.
     pub fn svg(&self) -> Result<String, String> {
-        let mut text = String::new();
         let height = TOP + ROW * self.rows.len().max(1) as u32 + BOTTOM;
-        {
-            let area = SVGBackend::with_string(&mut text, (WIDTH, height)).into_drawing_area();
-            self.draw(&area, height).map_err(|e| e.to_string())?;
-            area.present().map_err(|e| e.to_string())?;
-        }
-        Ok(text)
+        draw::svg((WIDTH, height), |area| self.draw(area, height))
     }
 
     /// Writes the chart to a file.
@@ -62,7 +58,6 @@ impl Chart {
     }
 
     fn draw(&self, area: &Area, height: u32) -> Result<(), DrawError<'_>> {
-        area.fill(&WHITE)?;
         write_text(area, &self.title, (24, 20), 24, HPos::Left, true)?;
         write_text(area, &self.subtitle, (24, 52), 15, HPos::Left, false)?;
         let scale = Scale::over(self.series.iter().flat_map(|s| s.values.iter().flatten()));
@@ -99,9 +94,6 @@ impl Chart {
     }
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type DrawError<'a> = DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>;
-
 /// A thin line from least to greatest, a thick one over the interval of confidence, a mark on the
 /// mean, and its number.
 fn draw_value(
@@ -111,7 +103,7 @@ fn draw_value(
     y: i32,
     series: usize,
 ) -> Result<(), DrawError<'static>> {
-    let color = COLORS[series % COLORS.len()];
+    let color = COLORS[series];
     let [min, max] = [value.min, value.max].map(|x| scale.x(x));
     area.draw(&PathElement::new([(min, y), (max, y)], color.stroke_width(1)))?;
     for x in [min, max] {
@@ -127,30 +119,6 @@ fn draw_value(
     mark(area, (scale.x(value.mean), y), series)?;
     let number = format!("{} s", digits(value.mean));
     write_text(area, &number, (end.max(scale.x(value.mean)) + 12, y - 7), 13, HPos::Left, false)
-}
-
-/// The series' mark: also the shapes differ, for print without colours.
-fn mark(area: &Area, at: (i32, i32), series: usize) -> Result<(), DrawError<'static>> {
-    let style = COLORS[series % COLORS.len()].filled();
-    match series {
-        0 => area.draw(&Rectangle::new([(at.0 - 5, at.1 - 5), (at.0 + 5, at.1 + 5)], style)),
-        1 => area.draw(&Circle::new(at, 6, style)),
-        _ => area.draw(&TriangleMarker::new(at, 7, style)),
-    }
-}
-
-fn write_text(
-    area: &Area,
-    text: &str,
-    at: (i32, i32),
-    size: u32,
-    side: HPos,
-    bold: bool,
-) -> Result<(), DrawError<'static>> {
-    let weight = if bold { FontStyle::Bold } else { FontStyle::Normal };
-    let font = (FONT, size).into_font().style(weight);
-    let style = TextStyle::from(font).color(&INK).pos(Pos::new(side, VPos::Top));
-    area.draw(&Text::new(text.to_owned(), at, style))
 }
 
 /// A logarithmic axis over whole powers of ten.
@@ -189,44 +157,9 @@ impl Scale {
     }
 }
 
-/// A power of ten as people write it.
-fn label(tick: f64) -> String {
-    let power = tick.log10().round() as i32;
-    if power < 0 { format!("{tick:.*}", -power as usize) } else { thousands(tick) }
-}
-
-/// Three significant digits.
-fn digits(x: f64) -> String {
-    let power = x.abs().log10().floor();
-    match power as i32 {
-        3.. => thousands(x.round()),
-        p if p.abs() < 7 => format!("{x:.*}", (2 - p).max(0) as usize),
-        _ => format!("{x:.2e}"),
-    }
-}
-
-fn thousands(x: f64) -> String {
-    let plain = format!("{x:.0}");
-    let mut text = String::new();
-    for (i, digit) in plain.chars().enumerate() {
-        if i > 0 && (plain.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_are_written_for_people() {
-        assert_eq!([0.001, 1.0, 1e6].map(label), ["0.001", "1", "1,000,000"]);
-        assert_eq!([0.01234, 1.0, 99.96, 123.4, 12345.6].map(digits)[..2], ["0.0123", "1.00"]);
-        assert_eq!(digits(12345.6), "12,346");
-    }
 
     #[test]
     fn every_value_lies_between_the_ends_of_the_axis() {
