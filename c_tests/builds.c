@@ -85,7 +85,7 @@ static void check_choice(const RtScene *scene) {
     RtMesh one = sheet(1);
     RtScene handful = scene_of(&one, 1, NULL, 0);
     const RtScene *scenes[3] = {scene, scene, &handful};
-    const float rays[3] = {0, 0.1f, 0};
+    const float rays[3] = {0, 0.05f, 0};
     const uint32_t kinds[3] = {RT_KIND_BVH, RT_KIND_GRID, RT_KIND_LIST};
     for (int i = 0; i < 3; i++) {
         RtBuildOptions options = {0};

@@ -254,11 +254,12 @@ fn memory_of_a_cancelled_build_may_be_used_again() {
     });
 }
 
-/// A BVH where rays are many or the scene uneven, a grid where they are few, a list for a handful.
+/// A BVH where rays are many, the scene uneven or its triangles long, a grid where rays are few, a list for a handful.
 #[test]
 fn the_choice_follows_the_rays_and_the_scene() {
     let surface: Model = make::blob(5_000, 1).into();
     let handful: Model = make::plane(8).into();
+    let hair: Model = make::hair(5_000, 1).into();
     let mut stadium = surface.clone();
     stadium.meshes.push(make::plane(50).placed(1e3, [-5e2, -5e2, -1.0]));
     let kind_of = |model: &Model, rays_per_prim: f32| {
@@ -273,7 +274,8 @@ fn the_choice_follows_the_rays_and_the_scene() {
     for rays in [0.0, 1e3, f32::INFINITY, f32::NAN] {
         assert_eq!(kind_of(&surface, rays), Kind::Bvh, "{rays}");
     }
-    assert_eq!(kind_of(&surface, 0.1), Kind::Grid);
-    assert_eq!(kind_of(&stadium, 0.1), Kind::Bvh);
-    assert_eq!(kind_of(&handful, 0.1), Kind::List);
+    assert_eq!(kind_of(&surface, 0.05), Kind::Grid);
+    assert_eq!(kind_of(&stadium, 0.05), Kind::Bvh);
+    assert_eq!(kind_of(&hair, 0.05), Kind::Bvh);
+    assert_eq!(kind_of(&handful, 0.05), Kind::List);
 }

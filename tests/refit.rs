@@ -179,7 +179,7 @@ fn what_was_not_built_for_it_is_left_as_it_is() {
             assert_eq!(refusal(&mut built, scene), Some(RefitError::NotRefittable));
         }
         // So few rays would make it a grid.
-        let few = BuildOptions { rays_per_prim: 0.1, ..refit };
+        let few = BuildOptions { rays_per_prim: 0.05, ..refit };
         let mut chosen = OwnedAccel::automatic(scene, &few).expect("a structure");
         assert_eq!(refusal(&mut chosen, scene), None, "no grid was chosen");
     });
