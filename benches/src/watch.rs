@@ -22,6 +22,12 @@ pub struct Watch {
     cost: Cost,
 }
 
+impl Default for Watch {
+    fn default() -> Self {
+        Watch::new()
+    }
+}
+
 impl Watch {
     /// A watch at zero; without counters when the system refuses any of them.
     pub fn new() -> Self {

@@ -61,6 +61,8 @@ pub struct Plot {
 
 const LEFT: i32 = 92;
 const RIGHT: i32 = 24;
+/// The same where labels need room beside the last marks.
+const LABELS: i32 = 120;
 const BOTTOM: i32 = 64;
 const WORDS: u32 = 14;
 /// From one row of the legend to the next.
@@ -76,7 +78,10 @@ impl Plot {
         let (width, height) = (self.size.0 as i32, self.size.1 as i32);
         write_text(area, &self.title, (16, 12), 18, HPos::Left, true)?;
         let top = 48 + LEGEND * (self.legend(area, width)? + 1);
-        let (right, bottom) = (width - RIGHT, height - BOTTOM);
+        let labels =
+            self.series.iter().flat_map(|series| &series.points).any(|p| !p.label.is_empty());
+        let right = width - if labels { LABELS } else { RIGHT };
+        let bottom = height - BOTTOM;
         let x = Placed::over(self.x.scale, self.values(|p| (p.at.0, p.x_interval)), [LEFT, right]);
         let y = Placed::over(self.y.scale, self.values(|p| (p.at.1, p.y_interval)), [bottom, top]);
         for (tick, words) in x.ticks() {
@@ -158,8 +163,7 @@ impl Plot {
             let (px, py) = spot(point);
             let (place, moved) = free_place((px, py), &point.label, &taken, frame);
             if moved {
-                let end = (place[0].clamp(px - 400, px + 400), (place[1] + place[3]) / 2);
-                let end = if place[0] < px { (place[2], end.1) } else { end };
+                let end = (px.clamp(place[0], place[2]), py.clamp(place[1], place[3]));
                 area.draw(&PathElement::new([(px, py), end], INK.mix(0.4)))?;
             }
             write_text(area, &point.label, (place[0], place[1]), WORDS, HPos::Left, false)?;
@@ -210,7 +214,8 @@ fn free_place(
     let (width, height) = (text_width(label, WORDS), WORDS as i32 + 2);
     let at = |x: i32, y: i32| [x, y, x + width, y + height];
     let fits = |p: &[i32; 4]| {
-        let inside = p[0] >= left && p[2] <= right + 20 && p[1] >= top - 10 && p[3] <= bottom;
+        let inside =
+            p[0] >= left && p[2] <= right + LABELS - 4 && p[1] >= top - 10 && p[3] <= bottom;
         let covers = |t: &[i32; 4]| p[0] < t[2] && t[0] < p[2] && p[1] < t[3] && t[1] < p[3];
         inside && !taken.iter().any(covers)
     };

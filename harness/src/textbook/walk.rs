@@ -66,8 +66,8 @@ pub fn crossed(ray: &Ray, side: i32, least: f64) -> Vec<Cell> {
 /// Where the ray enters the unit cube.
 fn entry(ray: &Ray, inverse: [f32; 3]) -> Option<f32> {
     let (mut near, mut far) = (0.0f32, f32::INFINITY);
-    for k in 0..3 {
-        let [a, b] = [0.0, 1.0].map(|wall: f32| (wall - ray.origin[k]) * inverse[k]);
+    for (origin, inverse) in ray.origin.into_iter().zip(inverse) {
+        let [a, b] = [0.0, 1.0].map(|wall: f32| (wall - origin) * inverse);
         near = near.max(a.min(b));
         far = far.min(a.max(b));
     }

@@ -11,7 +11,9 @@ use raykern_harness::assembly::{Assembly, Place};
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
 
-use crate::methods::{REFERENCE, Structure};
+#[cfg(feature = "embree")]
+use crate::methods::REFERENCE;
+use crate::methods::Structure;
 use crate::options::Options;
 use crate::rows::Build;
 use crate::structures::{Measured, Ready, build_all, random_rays, time};

@@ -29,6 +29,7 @@ use anyhow::Result;
 use clap::Parser;
 
 use crate::options::Options;
+use crate::rows::Fact;
 
 fn main() -> ExitCode {
     let options = Options::parse();
@@ -58,9 +59,15 @@ fn run(options: &Options) -> Result<u64> {
 
 fn measure(options: &Options) -> Result<()> {
     std::fs::create_dir_all(options.data())?;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let core = raykern_bench::watch::stay_on(options.core);
-    rows::write(options.data(), &options::machine(options, cores, core))?;
+    let mut facts = options::machine(options, core);
+    if !options.parts.is_empty() {
+        // What else is there was measured by other commands.
+        let before = rows::read::<Fact>(options.data())?.into_iter();
+        let said: Vec<String> = facts.iter().map(|fact| fact.value.clone()).collect();
+        facts.extend(before.filter(|fact| fact.key == "command" && !said.contains(&fact.value)));
+    }
+    rows::write(options.data(), &facts)?;
     for (part, measure) in PARTS {
         if options.wants(part) {
             eprintln!("{part} ...");

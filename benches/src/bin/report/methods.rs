@@ -89,8 +89,11 @@ enum Make {
     Embree4(i32),
     #[cfg(feature = "peers")]
     Library(fn(&Model) -> Result<raykern_bench::peers::Built, String>),
-    Textbook(fn(&Model) -> (Box<dyn Tracer>, usize)),
+    Textbook(BuildTree),
 }
+
+/// Builds a tree, with the bytes that it keeps.
+type BuildTree = fn(&Model) -> (Box<dyn Tracer>, usize);
 
 /// A structure of ours.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -247,7 +250,7 @@ fn libraries() -> impl Iterator<Item = Method> {
 }
 
 fn textbook() -> impl Iterator<Item = Method> {
-    let tests: [(&str, fn(&Model) -> (Box<dyn Tracer>, usize)); 4] = [
+    let tests: [(&str, BuildTree); 4] = [
         ("Moeller-Trumbore", plain_tree::<MoellerTrumbore>),
         ("Moeller-Trumbore f64", plain_tree::<MoellerTrumboreF64>),
         ("Woop-Benthin-Wald", plain_tree::<WoopBenthinWald>),

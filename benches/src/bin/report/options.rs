@@ -87,7 +87,9 @@ impl Options {
 }
 
 /// What the numbers were measured on, and how.
-pub fn machine(options: &Options, cores: usize, core: Option<usize>) -> Vec<Fact> {
+pub fn machine(options: &Options, core: Option<usize>) -> Vec<Fact> {
+    // All of them, not those that the program may use.
+    let cores = said("nproc", &["--all"]);
     let on = core.map_or("not kept on one core".to_owned(), |core| format!("kept on core {core}"));
     let features = [("embree", cfg!(feature = "embree")), ("peers", cfg!(feature = "peers"))];
     let features: Vec<_> = features.iter().filter(|f| f.1).map(|f| f.0).collect();
@@ -99,7 +101,7 @@ pub fn machine(options: &Options, cores: usize, core: Option<usize>) -> Vec<Fact
     );
     let facts = [
         ("processor", raykern_bench::report::processor()),
-        ("cores", format!("{cores}, one thread, {on}")),
+        ("threads", format!("one, {on}; {cores} cores")),
         ("best vector instructions", format!("{:?}", raykern::Backend::detected())),
         ("system", said("uname", &["-sr"])),
         ("date", said("date", &["-u", "+%Y-%m-%d %H:%M UTC"])),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use crate::figures::Figure;
+use crate::figures::{Figure, grouped};
 
 const STYLE: &str = include_str!("page.css");
 
@@ -63,7 +63,7 @@ impl<'a> Page<'a> {
     /// A table, of which the first line has the names; open by a click.
     pub fn table(&mut self, title: &str, lines: &[Vec<String>]) {
         let cells = |line: &[String], tag: &str| -> String {
-            line.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell))).collect()
+            line.iter().map(|cell| format!("<{tag}>{}</{tag}>", escaped(&grouped(cell)))).collect()
         };
         let Some((head, rest)) = lines.split_first() else { return };
         let mut html = format!(

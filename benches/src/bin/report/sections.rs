@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Result, ensure};
 use raykern_harness::stress;
 
-use crate::figures::{blog, cost, failures, growth, number, tradeoff};
+use crate::figures::{blog, cost, failures, grouped, growth, number, tradeoff};
 use crate::methods::{self, AGAIN, Group};
 use crate::ordinary;
 use crate::page::{Page, escaped, sentence};
@@ -82,7 +82,7 @@ fn verdict(page: &mut Page, numbers: &Numbers) {
     let say = |of: &[Summary], name: &str| {
         let summary = of.iter().find(|summary| summary.name == name)?;
         let ((speed, _), (wrong, (_, high))) = (summary.speed?, summary.wrong()?);
-        let [speed, wrong, high] = [speed, wrong, high].map(number);
+        let [speed, wrong, high] = [speed, wrong, high].map(|x| grouped(&number(x)));
         Some(format!(
             "{name}: {speed} of the speed of Embree 3, {wrong} wrong answers a million (at most {high})"
         ))

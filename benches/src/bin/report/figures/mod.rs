@@ -59,9 +59,11 @@ pub fn lines(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> Vec<
     std::iter::once(head).chain(rows).collect()
 }
 
-/// A whole number in groups of three digits.
-pub fn grouped(x: f64) -> String {
-    let plain = format!("{x:.0}");
+/// A number as people read it: whole ones from ten thousand on in groups of three digits; other words as they are.
+pub fn grouped(plain: &str) -> String {
+    if plain.len() < 5 || !plain.bytes().all(|byte| byte.is_ascii_digit()) {
+        return plain.to_owned();
+    }
     let place = |i: usize| i > 0 && (plain.len() - i).is_multiple_of(3);
     let digits = plain.chars().enumerate();
     digits.flat_map(|(i, digit)| place(i).then_some(',').into_iter().chain([digit])).collect()
@@ -71,11 +73,24 @@ pub fn grouped(x: f64) -> String {
 pub fn number(x: f64) -> String {
     match x.abs() {
         0.0 => "0".to_owned(),
-        size if (9999.5..1e12).contains(&size) => grouped(x),
         size if (0.01..1e6).contains(&size) => {
             let digits = (2 - size.log10().floor() as i32).clamp(0, 4) as usize;
             format!("{x:.digits$}")
         }
+        size if size.fract() == 0.0 && size < 1e12 => format!("{x:.0}"),
         _ => format!("{x:.2e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits_and_whole_ones_groups() {
+        let numbers = [0.0, 0.001234, 0.2, 1.0, 12.34, 4321.4, 1_234_567.0].map(number);
+        assert_eq!(numbers, ["0", "1.23e-3", "0.200", "1.00", "12.3", "4321", "1234567"]);
+        let grouped = ["1234567", "9999", "12345.6", "Embree 3"].map(grouped);
+        assert_eq!(grouped, ["1,234,567", "9999", "12345.6", "Embree 3"]);
     }
 }

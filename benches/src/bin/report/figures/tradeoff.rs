@@ -5,7 +5,7 @@ use raykern_harness::chart::plot::{Axis, Plot, Point, Scale, Series};
 use raykern_harness::chart::rows::{Row, Rows};
 use raykern_harness::stats::{median, median_interval};
 
-use super::{Figure, lines, number};
+use super::{Figure, grouped, lines, number};
 use crate::methods::{AGAIN, Group, REFERENCE};
 use crate::ordinary::FAMILY;
 use crate::rows::Run;
@@ -37,7 +37,7 @@ pub fn wrong(name: &str, title: &str, summaries: &[Summary], small: bool) -> Res
         front: front(&places),
         size: if small { (460, 380) } else { (1000, 680) },
     };
-    let (rays, runs) = (most_asked(&shown), run_count(&shown));
+    let (rays, runs) = (grouped(&most_asked(&shown).to_string()), run_count(&shown));
     let caption = format!(
         "Right is faster, down is more often right; whiskers are intervals of 95 %, from zero up to where the true share may \
          still be when no wrong answer was seen. The line joins what no other method beats. Up to {rays} rays a method judged, {runs} \
@@ -182,9 +182,7 @@ pub fn table(shown: &[&Summary]) -> Vec<Vec<String>> {
         let t = &s.tally;
         let mut line = vec![s.name.to_owned()];
         line.extend(speed.unwrap_or_else(none));
-        line.extend(
-            [t.asked, t.false_misses, t.false_hits, t.wrong_prims].map(|n| number(n as f64)),
-        );
+        line.extend([t.asked, t.false_misses, t.false_hits, t.wrong_prims].map(|n| n.to_string()));
         line.extend(wrong.unwrap_or_else(none));
         line.extend([ulps(0.5), ulps(0.99), ulps(1.0)]);
         line.extend([t.not_exact, t.gave_up].map(|n| n.to_string()));
