@@ -24,7 +24,7 @@ pub const COSTS: &str = "costs";
 /// Likewise, over a few triangles.
 pub const SIZES: &str = "sizes";
 /// The two automatic choices: for many rays, and for so few that a plain grid may suit.
-pub const AUTOMATIC: [&str; 2] = ["automatic", "automatic, 0.1 rays"];
+pub const AUTOMATIC: [&str; 2] = ["automatic", "automatic, 0.05 rays"];
 
 /// Every structure by name.
 pub const ALL: [(&str, Structure); 9] = [
@@ -36,7 +36,7 @@ pub const ALL: [(&str, Structure); 9] = [
     ("BVH", Structure::Wide(Quality::Balanced)),
     ("BVH best", Structure::Wide(Quality::Best)),
     (AUTOMATIC[0], Structure::Automatic(0.0)),
-    (AUTOMATIC[1], Structure::Automatic(0.1)),
+    (AUTOMATIC[1], Structure::Automatic(0.05)),
 ];
 
 /// A build that takes longer is not repeated as often.
