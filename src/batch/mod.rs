@@ -48,11 +48,31 @@ pub(crate) fn ask_all<'m, Q: Together<'m>, A: Record<Q::Answer>>(
     answers: &mut [A],
     question: Q,
 ) {
+    ask_many(block, rays, answers, question, true);
+}
+
+/// The same for rays that are not to be traced as one.
+pub(crate) fn ask_apart<'m, Q: Together<'m>, A: Record<Q::Answer>>(
+    block: Finished<'m>,
+    rays: &[Ray],
+    answers: &mut [A],
+    question: Q,
+) {
+    ask_many(block, rays, answers, question, false);
+}
+
+fn ask_many<'m, Q: Together<'m>, A: Record<Q::Answer>>(
+    block: Finished<'m>,
+    rays: &[Ray],
+    answers: &mut [A],
+    question: Q,
+    packets: bool,
+) {
     // Only for the layout that is chosen automatically: others would be more copies of the code.
     let parts = &block.parts();
     match parts.bundles {
         Bundles::Sixteen(bundles) if rays.len() > 1 => {
-            simd::dispatch(Batch { block: parts, bundles, rays, answers, question });
+            simd::dispatch(Batch { block: parts, bundles, rays, answers, question, packets });
         }
         _ => ask_each(block, rays, answers, question),
     }
@@ -77,6 +97,8 @@ struct Batch<'a, 'm, Q: Question<'m>, A> {
     rays: &'a [Ray],
     answers: &'a mut [A],
     question: Q,
+    /// Whether rays that are alike are traced as one.
+    packets: bool,
 }
 
 impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
@@ -106,7 +128,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Where the packet that begins with the ray `first` ends, or else where the next one begins.
     #[inline(always)]
     fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (Option<Alike>, usize) {
-        let mut end = first;
+        let mut end = if self.packets { first } else { count };
         while end < count {
             let rays = &self.rays[end..count];
             if let Some((alike, length)) = Alike::first_of(s, rays, self.block.header.reach) {
@@ -150,9 +172,9 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// The rays from `first` to `end`.
     #[inline(always)]
     fn part(&mut self, first: usize, end: usize) -> Batch<'_, 'm, Q, A> {
-        let Batch { block, bundles, rays, question, .. } = *self;
+        let Batch { block, bundles, rays, question, packets, .. } = *self;
         let (rays, answers) = (&rays[first..end], &mut self.answers[first..end]);
-        Batch { block, bundles, rays, answers, question }
+        Batch { block, bundles, rays, answers, question, packets }
     }
 
     /// Writes the answer of a ray.
