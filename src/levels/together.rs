@@ -8,7 +8,7 @@ use super::stops::{CHUNK, Gather, Stops};
 use super::{Best, Shown, any, closest};
 use crate::batch::{self, Record};
 use crate::block::Finished;
-use crate::block::level::Level;
+use crate::block::level::{InstanceRecord, Level};
 use crate::query::{Choice, Exact, QueryOptions};
 use crate::ray::{Hit, NONE, Ray};
 use crate::simd;
@@ -132,7 +132,7 @@ struct Chunk<'a, 'm> {
     options: &'a QueryOptions,
 }
 
-impl Chunk<'_, '_> {
+impl<'m> Chunk<'_, 'm> {
     /// Answers for up to [`CHUNK`] rays.
     fn ask<A: Asked>(&self, rays: &[Ray], answers: &mut [A::Answer]) {
         answers.fill(A::NOTHING);
@@ -140,34 +140,59 @@ impl Chunk<'_, '_> {
         if !own.is_empty() {
             batch::ask_all(own.block, rays, answers, A::question(own.choice(self.options)));
         }
-        let mut limited = [Ray::new([0.0; 3], [0.0; 3]); CHUNK];
+        let (mut limited, mut stops) = ([NO_RAY; CHUNK], [Stops::NONE; CHUNK]);
         let limited = &mut limited[..rays.len()];
         limited.copy_from_slice(rays);
         set_limits::<A>(rays, answers, limited);
-        let mut stops = [Stops::NONE; CHUNK];
         if !simd::dispatch(Gather { level: self.level, rays: limited, stops: &mut stops }) {
             return self.ask_alone::<A>(rays, answers, |_, _| true);
         }
-        let mut room = Room {
-            there: [Ray::new([0.0; 3], [0.0; 3]); CHUNK],
-            who: [0; CHUNK],
-            met: [A::NOTHING; CHUNK],
-        };
-        let mut turns = [Turn { instance: NONE, ray: 0 }; CHUNK];
+        let (mut turns, mut room) = ([Turn::NONE; CHUNK], Room::new::<A>());
         loop {
-            set_limits::<A>(rays, answers, limited);
-            let turns = next_turns::<A>(answers, limited, &mut stops, &mut turns);
-            if turns.is_empty() {
+            let count = self.take_turns::<A>(answers, limited, &mut stops, &mut turns);
+            if count == 0 {
                 break;
             }
-            for turns in turns.chunk_by(|a, b| a.instance == b.instance) {
+            for turns in turns[..count].chunk_by(|a, b| self.go_together(a, b)) {
                 self.visit::<A>(turns, limited, &mut room, answers);
             }
+            set_limits::<A>(rays, answers, limited);
         }
         self.ask_alone::<A>(rays, answers, |i, limit| !stops[i].are_all(limit));
     }
 
-    /// Asks an instance about all rays whose turn it is.
+    /// Finds where each ray goes that has somewhere to go, by child and instance; returns how many these are.
+    fn take_turns<A: Asked>(
+        &self,
+        answers: &[A::Answer],
+        rays: &[Ray],
+        stops: &mut [Stops; CHUNK],
+        turns: &mut [Turn; CHUNK],
+    ) -> usize {
+        let mut count = 0;
+        for (i, ((ray, answer), stops)) in rays.iter().zip(answers).zip(stops).enumerate() {
+            if A::limit(answer, ray).is_none() {
+                continue;
+            }
+            while let Some(instance) = stops.next(ray.t_max) {
+                if let Some((_, record)) = Shown::of(self.level, instance, self.options) {
+                    turns[count] = Turn { child: record.child, instance, ray: i as u32 };
+                    count += 1;
+                    break;
+                }
+            }
+        }
+        turns[..count].sort_unstable();
+        count
+    }
+
+    /// Whether the same question is asked of the same block.
+    fn go_together(&self, a: &Turn, b: &Turn) -> bool {
+        let alike = a.instance == b.instance || self.options.skip.is_none();
+        a.child == b.child && alike
+    }
+
+    /// Asks a child about rays in its space: all for whom it is the same question.
     fn visit<A: Asked>(
         &self,
         turns: &[Turn],
@@ -175,14 +200,14 @@ impl Chunk<'_, '_> {
         room: &mut Room<A::Answer>,
         answers: &mut [A::Answer],
     ) {
-        let Some(first) = turns.first() else { return };
-        let shown = Shown::of(self.level, first.instance, self.options);
-        let Some((shown, record)) = shown.filter(|(shown, _)| !shown.is_empty()) else { return };
+        let first = turns.first().and_then(|turn| self.shown(turn.instance));
+        let Some((shown, _)) = first else { return };
         let Room { there, who, met } = room;
         let mut count = 0;
         for turn in turns {
-            if let Some(ray) = record.object_ray(&rays[turn.ray]) {
-                (there[count], who[count]) = (ray, turn.ray);
+            let ray = &rays[turn.ray as usize];
+            if let Some(ray) = self.shown(turn.instance).and_then(|(_, at)| at.object_ray(ray)) {
+                (there[count], who[count]) = (ray, *turn);
                 count += 1;
             }
         }
@@ -193,9 +218,14 @@ impl Chunk<'_, '_> {
         } else {
             batch::ask_apart(shown.block, there, met, question);
         }
-        for (met, i) in met.iter().zip(who) {
-            A::take(self, &rays[*i], first.instance, *met, &mut answers[*i]);
+        for (met, turn) in met.iter().zip(who) {
+            let i = turn.ray as usize;
+            A::take(self, &rays[i], turn.instance, *met, &mut answers[i]);
         }
+    }
+
+    fn shown(&self, instance: u32) -> Option<(Shown<'m>, &'m InstanceRecord)> {
+        Shown::of(self.level, instance, self.options)
     }
 
     /// Answers anew for each ray that has something to look for and of which `wanted` says so.
@@ -219,53 +249,45 @@ impl Chunk<'_, '_> {
         both.is_some_and(|(hit, other)| hit.is_before::<Exact>(&other, self.options))
     }
 
-    fn best(&self, ray: &Ray, hit: &Hit) -> Option<Best<'_>> {
+    fn best(&self, ray: &Ray, hit: &Hit) -> Option<Best<'m>> {
         if hit.instance == NONE {
-            return (hit.prim != NONE).then(|| Best { hit: *hit, shown: Shown::own(self.block), ray: *ray });
+            let own = Best { hit: *hit, shown: Shown::own(self.block), ray: *ray };
+            return (hit.prim != NONE).then_some(own);
         }
-        let (shown, record) = Shown::of(self.level, hit.instance, self.options)?;
+        let (shown, record) = self.shown(hit.instance)?;
         Some(Best { hit: *hit, shown, ray: record.object_ray(ray)? })
     }
 }
 
-/// Room for the rays of one instance.
+const NO_RAY: Ray = Ray::new([0.0; 3], [0.0; 3]);
+
+/// A ray and the instance that it goes to, which shows a child.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Turn {
+    child: u32,
+    instance: u32,
+    ray: u32,
+}
+
+impl Turn {
+    const NONE: Self = Turn { child: 0, instance: NONE, ray: 0 };
+}
+
+/// Room for the rays that a child is asked about.
 struct Room<Answer> {
     there: [Ray; CHUNK],
-    /// Which of the chunk they are.
-    who: [usize; CHUNK],
+    who: [Turn; CHUNK],
     met: [Answer; CHUNK],
 }
 
-/// A ray and the instance that it goes to.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Turn {
-    instance: u32,
-    ray: usize,
+impl<Answer> Room<Answer> {
+    fn new<A: Asked<Answer = Answer>>() -> Self {
+        Room { there: [NO_RAY; CHUNK], who: [Turn::NONE; CHUNK], met: [A::NOTHING; CHUNK] }
+    }
 }
 
 fn set_limits<A: Asked>(rays: &[Ray], answers: &[A::Answer], limited: &mut [Ray]) {
     for ((ray, answer), limited) in rays.iter().zip(answers).zip(limited) {
         limited.t_max = A::limit(answer, ray).unwrap_or(f32::NEG_INFINITY);
     }
-}
-
-/// Where each ray goes that has somewhere to go, by instance.
-fn next_turns<'t, A: Asked>(
-    answers: &[A::Answer],
-    rays: &[Ray],
-    stops: &mut [Stops; CHUNK],
-    turns: &'t mut [Turn; CHUNK],
-) -> &'t [Turn] {
-    let mut count = 0;
-    for (i, ((ray, answer), stops)) in rays.iter().zip(answers).zip(stops).enumerate() {
-        if A::limit(answer, ray).is_some()
-            && let Some(instance) = stops.next(ray.t_max)
-        {
-            turns[count] = Turn { instance, ray: i };
-            count += 1;
-        }
-    }
-    let turns = &mut turns[..count];
-    turns.sort_unstable();
-    turns
 }
