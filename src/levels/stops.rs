@@ -136,13 +136,7 @@ impl Gatherer<'_, '_> {
 
     /// For rays that are alike; false if they had better go one by one.
     #[inline(always)]
-    fn together<S: Simd>(
-        &mut self,
-        s: S,
-        alike: Alike,
-        rays: &[Ray],
-        stops: &mut [Stops],
-    ) -> bool {
+    fn together<S: Simd>(&mut self, s: S, alike: Alike, rays: &[Ray], stops: &mut [Stops]) -> bool {
         let Bundles::Sixteen(bundles) = self.index.bundles else { return false };
         if rays.iter().any(|ray| widening(self.level, ray) != 0.0) {
             return false;

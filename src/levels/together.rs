@@ -6,7 +6,7 @@
 
 use super::stops::{CHUNK, Gather, Stops};
 use super::{Best, Shown, any, closest};
-use crate::batch::{self, Record};
+use crate::batch::{self, Manner, Record};
 use crate::block::Finished;
 use crate::block::level::{InstanceRecord, Level};
 use crate::query::{Choice, Exact, QueryOptions};
@@ -16,6 +16,13 @@ use crate::trace::{AnyHit, ClosestHit, Together};
 
 /// So few rays are asked for one by one.
 const FEW: usize = 4;
+
+/// So many pairs of neighbours are looked at.
+const LOOKED_AT: usize = 12;
+/// Rays that pass this near each other, of the child's largest coordinate, meet much the same of it.
+const CLOSE: f32 = 1.0 / 700.0;
+/// Directions that differ less, of their largest component, are alike.
+const ALIKE: f32 = 1.0 / 8.0;
 
 /// The exact closest hit of each ray in a block with instances, [`Hit::MISS`] without one. Stops at the end of the shorter
 /// slice.
@@ -44,6 +51,8 @@ trait Asked {
     type Answer: Record<Self::Met> + Copy;
     type Question: for<'m> Together<'m, Answer = Self::Met>;
     const NOTHING: Self::Answer;
+    /// Neighbours that pass further from each other, of the child's largest coordinate, are no stream.
+    const FAR: f32;
 
     fn question(choice: Choice) -> Self::Question;
 
@@ -64,6 +73,7 @@ impl Asked for Nearest {
     type Answer = Hit;
     type Question = ClosestHit<Exact, (), 0>;
     const NOTHING: Hit = Hit::MISS;
+    const FAR: f32 = 1.0 / 64.0;
 
     fn question(choice: Choice) -> Self::Question {
         ClosestHit::new(choice, ())
@@ -94,6 +104,7 @@ impl Asked for Whether {
     type Answer = bool;
     type Question = AnyHit<Exact, ()>;
     const NOTHING: bool = false;
+    const FAR: f32 = f32::INFINITY;
 
     fn question(choice: Choice) -> Self::Question {
         AnyHit::new(choice, ())
@@ -216,7 +227,8 @@ impl<'m> Chunk<'_, 'm> {
         if count < FEW {
             batch::ask_each(shown.block, there, met, question);
         } else {
-            batch::ask_apart(shown.block, there, met, question);
+            let manner = manner_of::<A>(shown.block, there, who);
+            batch::ask_in(manner, shown.block, there, met, question);
         }
         for (met, turn) in met.iter().zip(who) {
             let i = turn.ray as usize;
@@ -257,6 +269,41 @@ impl<'m> Chunk<'_, 'm> {
         let (shown, record) = self.shown(hit.instance)?;
         Some(Best { hit: *hit, shown, ray: record.object_ray(ray)? })
     }
+}
+
+/// How a child had better be asked about these rays.
+///
+/// Where rays begin says little here: those of a camera begin at one point, and come to a small instance as far apart as any.
+fn manner_of<A: Asked>(child: Finished, rays: &[Ray], turns: &[Turn]) -> Manner {
+    let header = child.header();
+    let middle = [0, 1, 2].map(|k| 0.5 * (header.bounds.lower[k] + header.bounds.upper[k]));
+    let (mut pairs, mut apart, mut sum) = (0, 0, 0.0);
+    for (rays, turns) in rays.windows(2).zip(turns.windows(2)).take(LOOKED_AT) {
+        let distance = largest_difference(passing(&rays[0], middle), passing(&rays[1], middle));
+        let same = turns[0].instance == turns[1].instance;
+        let [a, b] = [0, 1].map(|i| rays[i].direction);
+        let alike = same && largest_difference(a, b) < ALIKE * largest_difference(a, [0.0; 3]);
+        pairs += 1;
+        sum += if alike { distance } else { f32::INFINITY };
+        apart += usize::from(!(alike && distance < A::FAR * header.reach));
+    }
+    match () {
+        () if sum < CLOSE * header.reach * pairs as f32 => Manner::AsTheyAre,
+        () if 2 * apart < pairs => Manner::Stream,
+        () => Manner::Flights,
+    }
+}
+
+/// Where the line of a ray is nearest to a point, or nearly.
+fn passing(ray: &Ray, point: [f32; 3]) -> [f32; 3] {
+    let Ray { origin: o, direction: d, .. } = *ray;
+    let dot = |v: [f32; 3]| v[0] * d[0] + v[1] * d[1] + v[2] * d[2];
+    let t = dot([point[0] - o[0], point[1] - o[1], point[2] - o[2]]) / dot(d);
+    [o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]]
+}
+
+fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (0..3).fold(0.0, |largest, k| f32::max(largest, (b[k] - a[k]).abs()))
 }
 
 const NO_RAY: Ray = Ray::new([0.0; 3], [0.0; 3]);
