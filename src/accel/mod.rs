@@ -168,13 +168,15 @@ impl<'m> Accel<'m> {
     /// Stops at the end of the shorter slice.
     pub fn intersect_batch_with(&self, rays: &[Ray], options: &QueryOptions, hits: &mut [Hit]) {
         let (block, choice) = (self.0, self.choice(options));
-        if block.has_level() {
-            for (ray, hit) in rays.iter().zip(hits) {
-                *hit = self.intersect_with(ray, options).unwrap_or(Hit::MISS);
-            }
-            return;
-        }
         match options.precision {
+            Precision::Exact if block.has_level() => {
+                levels::closest_of_each(block, rays, options, hits);
+            }
+            _ if block.has_level() => {
+                for (ray, hit) in rays.iter().zip(hits) {
+                    *hit = self.intersect_with(ray, options).unwrap_or(Hit::MISS);
+                }
+            }
             Precision::Exact => {
                 // Many of them are in flight, so each had better be small.
                 let question = ClosestHit::<Exact, _, 0>::new(choice, ());
@@ -190,13 +192,15 @@ impl<'m> Accel<'m> {
     /// [`occluded_with`](Self::occluded_with) for each ray. Stops at the end of the shorter slice.
     pub fn occluded_batch_with(&self, rays: &[Ray], options: &QueryOptions, occluded: &mut [bool]) {
         let (block, choice) = (self.0, self.choice(options));
-        if block.has_level() {
-            for (ray, occluded) in rays.iter().zip(occluded) {
-                *occluded = self.occluded_with(ray, options);
-            }
-            return;
-        }
         match options.precision {
+            Precision::Exact if block.has_level() => {
+                levels::any_of_each(block, rays, options, occluded);
+            }
+            _ if block.has_level() => {
+                for (ray, occluded) in rays.iter().zip(occluded) {
+                    *occluded = self.occluded_with(ray, options);
+                }
+            }
             Precision::Exact => {
                 batch::ask_all(block, rays, occluded, AnyHit::<Exact, _>::new(choice, ()));
             }

@@ -41,8 +41,30 @@ impl Record<bool> for bool {
     }
 }
 
+/// How rays are traced that are many.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Manner {
+    /// By what is seen of them: as one where they are alike.
+    AsTheyAre,
+    /// As a stream.
+    Stream,
+    /// Several in flight.
+    Flights,
+}
+
 /// Answers `question` for each ray; stops at the end of the shorter slice.
 pub(crate) fn ask_all<'m, Q: Together<'m>, A: Record<Q::Answer>>(
+    block: Finished<'m>,
+    rays: &[Ray],
+    answers: &mut [A],
+    question: Q,
+) {
+    ask_in(Manner::AsTheyAre, block, rays, answers, question);
+}
+
+/// The same for rays of which more is known.
+pub(crate) fn ask_in<'m, Q: Together<'m>, A: Record<Q::Answer>>(
+    manner: Manner,
     block: Finished<'m>,
     rays: &[Ray],
     answers: &mut [A],
@@ -52,7 +74,7 @@ pub(crate) fn ask_all<'m, Q: Together<'m>, A: Record<Q::Answer>>(
     let parts = &block.parts();
     match parts.bundles {
         Bundles::Sixteen(bundles) if rays.len() > 1 => {
-            simd::dispatch(Batch { block: parts, bundles, rays, answers, question });
+            simd::dispatch(Batch { block: parts, bundles, rays, answers, question, manner });
         }
         _ => ask_each(block, rays, answers, question),
     }
@@ -77,6 +99,7 @@ struct Batch<'a, 'm, Q: Question<'m>, A> {
     rays: &'a [Ray],
     answers: &'a mut [A],
     question: Q,
+    manner: Manner,
 }
 
 impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
@@ -106,7 +129,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Where the packet that begins with the ray `first` ends, or else where the next one begins.
     #[inline(always)]
     fn stretch<S: Simd>(&self, s: S, first: usize, count: usize) -> (Option<Alike>, usize) {
-        let mut end = first;
+        let mut end = if self.manner == Manner::AsTheyAre { first } else { count };
         while end < count {
             let rays = &self.rays[end..count];
             if let Some((alike, length)) = Alike::first_of(s, rays, self.block.header.reach) {
@@ -121,7 +144,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     #[inline(always)]
     fn trace_apart<S: Simd>(self, s: S) {
         let size = self.block.whole.bytes().len();
-        if size < SMALL || self.begin_together() {
+        if size < SMALL || self.had_better_stream() {
             self.stream(s);
         } else if size < NEAR[usize::from(!Q::Query::ORDERED)] {
             let Batch { block, rays, answers, question, .. } = self;
@@ -131,9 +154,12 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
         }
     }
 
-    /// Whether most rays begin near the one before.
+    /// Whether most rays begin near the one before, if nothing else is known of them.
     #[inline(always)]
-    fn begin_together(&self) -> bool {
+    fn had_better_stream(&self) -> bool {
+        if self.manner != Manner::AsTheyAre {
+            return self.manner == Manner::Stream;
+        }
         let far = FAR * self.block.header.reach;
         let (mut pairs, mut apart) = (0, 0);
         for pair in self.rays.windows(2).take(LOOKED_AT) {
@@ -150,9 +176,9 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// The rays from `first` to `end`.
     #[inline(always)]
     fn part(&mut self, first: usize, end: usize) -> Batch<'_, 'm, Q, A> {
-        let Batch { block, bundles, rays, question, .. } = *self;
+        let Batch { block, bundles, rays, question, manner, .. } = *self;
         let (rays, answers) = (&rays[first..end], &mut self.answers[first..end]);
-        Batch { block, bundles, rays, answers, question }
+        Batch { block, bundles, rays, answers, question, manner }
     }
 
     /// Writes the answer of a ray.

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, reason = "each test file uses a part of it")]
 
+pub mod batch;
+
 use raykern::{
     Accel, Backend, BuildOptions, GridKind, GridOptions, Hit, Layout, OpenError, OwnedAccel,
     PlainList, Quality, QueryOptions, Ray, Scene,
