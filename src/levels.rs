@@ -17,7 +17,7 @@ use crate::query::{
 };
 use crate::ray::{Hit, Late, NONE, PreparedRay, Ray, WideSlab};
 use crate::simd::{self, Kernel, Scalar, Simd};
-use crate::trace::{AnyHit, ClosestHit, ClosestMet, MEMORY, ask, trace};
+use crate::trace::{ClosestMet, any_hit, ask, closest_hit, trace};
 
 /// The closest hit of a block with instances among what `options` leave.
 #[inline(never)]
@@ -32,8 +32,8 @@ pub(crate) fn closest<D: Across, W: Watch>(
         if place.is_empty() {
             return None;
         }
-        let question = ClosestHit::<D, _, MEMORY>::new(place.choice(options), watch.lend());
-        let hit = ask(place.block, ray, question)?;
+        let choice = place.choice(options);
+        let hit = closest_hit::<D, _>(place.block, ray, choice, watch.lend())?;
         Some(Hit { instance: place.instance, ..hit })
     };
     let own = Shown::own(block);
@@ -70,8 +70,8 @@ pub(crate) fn any<D: Decide, W: Watch>(
 ) -> bool {
     let Some(level) = block.level() else { return false };
     let mut is_hit_in = |place: &Shown, ray: &Ray| {
-        let question = AnyHit::<D, _>::new(place.choice(options), watch.lend());
-        !place.is_empty() && ask(place.block, ray, question)
+        let choice = place.choice(options);
+        !place.is_empty() && any_hit::<D, _>(place.block, ray, choice, watch.lend())
     };
     if is_hit_in(&Shown::own(block), ray) {
         return true;
