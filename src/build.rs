@@ -11,7 +11,7 @@ use crate::choice::suits_grid;
 use crate::error::BuildError;
 use crate::grid::{self, GridKind, GridOptions};
 use crate::instance::{Placed, fixed_size, write};
-use crate::kinds::{GRID, INSTANCES, SPHERES, WIDE};
+use crate::kinds::{GRID, INSTANCES, REFIT, SPHERES, WIDE};
 use crate::list;
 use crate::math::Aabb;
 use crate::prim::{Survey, survey};
@@ -216,7 +216,8 @@ impl Plan {
         }
         let census = Census::take(scene, &survey, &Caller::new(options.threads, None))?;
         // Instances are not refitted: their index is built anew.
-        let refit = options.refit && scene.instance_count() == 0 && scene.boxes().is_none();
+        let asked_to = REFIT && options.refit;
+        let refit = asked_to && scene.instance_count() == 0 && scene.boxes().is_none();
         let kept = if refit { census.for_refit() } else { census };
         let structure = match asked {
             _ if kept.hittable() <= handful => Structure::List,
@@ -341,12 +342,12 @@ impl<'s> Job<'s> {
         let built = own.run(scene, options, &caller, &mut bytes[..room]);
         caller.done(1.0).ok_or(BuildError::Cancelled)?;
         let size = match level {
-            Some(level) => level.run(options, built?, bytes),
-            None => Some(built?),
+            Some(level) if INSTANCES => level.run(options, built?, bytes),
+            _ => Some(built?),
         };
         let block = size.and_then(|size| bytes.get_mut(..size));
         let block = block.ok_or(BuildError::OutOfMemory { minimum })?;
-        if own.census.refit {
+        if REFIT && own.census.refit {
             // The scene was checked and the block is whole, so this error does not arise.
             refit::finish(block, scene, &caller).ok_or(BuildError::TooLarge)?;
         }
@@ -371,6 +372,9 @@ impl BuildOptions<'_> {
         match self.layout {
             Layout::Automatic | Layout::Compact | Layout::Wide(4 | 8 | 16) => {}
             Layout::Wide(width) => return Err(BuildError::NoSuchLayout { width }),
+        }
+        if self.refit && !REFIT {
+            return Err(BuildError::LeftOut);
         }
         Ok(())
     }

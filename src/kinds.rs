@@ -12,3 +12,5 @@ pub(crate) const GRID: bool = cfg!(feature = "grid");
 pub(crate) const SPHERES: bool = cfg!(feature = "spheres");
 /// Blocks with instances.
 pub(crate) const INSTANCES: bool = cfg!(feature = "instances");
+/// Blocks that can be refitted.
+pub(crate) const REFIT: bool = cfg!(feature = "refit");

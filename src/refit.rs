@@ -5,8 +5,8 @@ use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES};
 use crate::block::{Counts, Finished, Header, KIND_GRID, Motion, PartsMut};
 use crate::bvh::{Cost, refit_bundles, refit_nodes};
 use crate::caller::Caller;
-use crate::error::RefitError;
-use crate::kinds::WIDE;
+use crate::error::{OpenError, RefitError};
+use crate::kinds::{REFIT, WIDE};
 use crate::math::Aabb;
 use crate::prim::{self, Leaves, Source, geometry_table, refit_leaves, survey};
 use crate::scene::Scene;
@@ -18,6 +18,9 @@ use crate::storage::{self, Plain};
 /// First the leaf blocks are filled anew, on any thread, then the boxes above them from the last to the first. Whatever
 /// `bytes` hold, nothing outside is read or written; and a block that may be opened stays one.
 pub(crate) fn refit(bytes: &mut [u8], moved: &Scene, caller: &Caller) -> Result<f32, RefitError> {
+    if !REFIT {
+        return Err(RefitError::NoBlock(OpenError::Layout));
+    }
     let block = Finished::split(bytes).map_err(RefitError::NoBlock)?;
     let header = block.parts().header;
     let motion = block.motion().filter(|_| header.kind != KIND_GRID && !block.has_level());

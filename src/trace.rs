@@ -10,11 +10,11 @@ use crate::kinds::{GRID, WIDE};
 use crate::math::Bits;
 use crate::prim::Leaves;
 use crate::query::{
-    Any, Choice, Closest, Decide, Exact, ExactMet, Filter, Locate, Meets, Query, SureMeetings,
-    Wanted, Watch, geometry_of,
+    Any, Choice, Closest, Decide, Either, Exact, ExactMet, Filter, Locate, Meets, Query,
+    SureMeetings, Wanted, Watch, geometry_of,
 };
-use crate::ray::{Abreast, Hit, Interval, Late, NONE, PreparedRay, Ray, Slab, WideSlab};
-use crate::simd::{self, Kernel, Scalar, Simd};
+use crate::ray::{Abreast, FrameSlab, Hit, Interval, Late, NONE, PreparedRay, Ray, Slab};
+use crate::simd::{self, Kernel, SMALL, Scalar, Simd};
 
 /// What is asked of a ray.
 pub(crate) trait Question<'m> {
@@ -117,6 +117,80 @@ impl<'m, D: Decide, W: Watch> Question<'m> for AnyHit<D, W> {
     fn nothing() -> bool {
         false
     }
+}
+
+/// One of these two, as is known when it is asked: one code for both. Any hit is answered by [`Hit::MISS`].
+#[derive(Clone, Copy)]
+struct EitherHit<D, W> {
+    choice: Choice,
+    watch: W,
+    any: bool,
+    decide: PhantomData<D>,
+}
+
+impl<'m, D: Decide, W: Watch> Question<'m> for EitherHit<D, W> {
+    type Query = Either<'m, D, W>;
+    type Answer = Option<Hit>;
+
+    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
+        let EitherHit { choice, watch, any, .. } = self;
+        Either { closest: ClosestHit::new(choice, watch).query(block, t_max), any }
+    }
+
+    fn answer(
+        block: &Block<'m>,
+        ray: &PreparedRay,
+        query: &mut Self::Query,
+        ended: bool,
+    ) -> Option<Hit> {
+        match query.any {
+            true => ended.then_some(Hit::MISS),
+            false => ClosestHit::<D, W, 0>::answer(block, ray, &mut query.closest, ended),
+        }
+    }
+
+    fn nothing() -> Option<Hit> {
+        None
+    }
+}
+
+/// The closest hit of a block without what is in instances.
+#[inline(always)]
+pub(crate) fn closest_hit<D: Decide, W: Watch>(
+    block: Finished,
+    ray: &Ray,
+    choice: Choice,
+    watch: W,
+) -> Option<Hit> {
+    if SMALL {
+        return either_hit::<D, W>(block, ray, choice, watch, false);
+    }
+    ask(block, ray, ClosestHit::<D, W, MEMORY>::new(choice, watch))
+}
+
+/// Whether anything is hit in a block without what is in instances.
+#[inline(always)]
+pub(crate) fn any_hit<D: Decide, W: Watch>(
+    block: Finished,
+    ray: &Ray,
+    choice: Choice,
+    watch: W,
+) -> bool {
+    if SMALL {
+        return either_hit::<D, W>(block, ray, choice, watch, true).is_some();
+    }
+    ask(block, ray, AnyHit::<D, W>::new(choice, watch))
+}
+
+#[inline(never)]
+fn either_hit<D: Decide, W: Watch>(
+    block: Finished,
+    ray: &Ray,
+    choice: Choice,
+    watch: W,
+    any: bool,
+) -> Option<Hit> {
+    ask(block, ray, EitherHit::<D, W> { choice, watch, any, decide: PhantomData })
 }
 
 /// What each of sixteen rays meets before all others: a lane of a leaf block.
@@ -320,6 +394,9 @@ impl<'m> Question<'m> for ClosestMet {
 /// The answer to `question` for one ray, without what is in instances.
 #[inline(always)]
 pub(crate) fn ask<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
+    if SMALL {
+        return ask_any(block, ray, question);
+    }
     let ask = Ask { block, ray, question };
     if Q::RARE { ask.run(Scalar) } else { simd::dispatch(ask) }
 }
@@ -340,9 +417,8 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
         // Parts are not lent to what is out of line, which would have them all computed.
         let block = &block.parts();
         let reach = block.header.reach;
-        let ready = if S::SMALL { ray.set_out_apart(s, reach) } else { ray.set_out(s, reach) };
-        let Some((mut late, slab)) = ready else {
-            return ask_odd(block.whole, ray, question);
+        let Some((mut late, slab)) = ray.set_out(s, reach) else {
+            return ask_any(block.whole, ray, question);
         };
         let mut query = question.query(block, late.t_max);
         let ended = trace(s, block, &mut late, &slab, &mut query);
@@ -351,14 +427,16 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
     }
 }
 
-/// For rays and scenes at the ends of the floats, with boxes in `f64`. They are so rare that portable code will do.
+/// For any ray: for those at the ends of the floats, which are so rare that portable code will do, and for all where code
+/// shall be small.
 #[cold]
 #[inline(never)]
-fn ask_odd<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
+fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
     let block = &block.parts();
-    let Some(mut ray) = ray.prepare_odd(block.header.reach) else { return Q::nothing() };
+    let reach = block.header.reach;
+    let Some(mut ray) = ray.prepare_any(reach) else { return Q::nothing() };
     let mut query = question.query(block, ray.t_max);
-    let slab = WideSlab::new(&ray);
+    let slab = FrameSlab::new(&ray, reach);
     let ended = trace(Scalar, block, &mut ray, &slab, &mut query);
     Q::answer(block, &ray, &mut query, ended)
 }

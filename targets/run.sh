@@ -152,6 +152,7 @@ board() { # prefix, Rust target, board
         done < <(grep '^#' "$printed")
     done
     size "$1" "$small" queries rt_accel_open rt_intersect rt_occluded
+    size "$1" "$small" watertight rt_accel_open rt_intersect_watertight rt_occluded_watertight
     size "$1" "$small" choices rt_accel_open rt_intersect_with rt_occluded_with
     size "$1" "$small" build rt_build_bvh rt_bvh_needs -Wl,--defsym=raykern_could_panic=0
 }

@@ -11,7 +11,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("math", &[]),
     ("error", &[]),
     ("storage", &[]),
-    ("simd", &[]),
+    ("simd", &["math"]),
     ("caller", &[]),
     ("exact", &["kinds", "math"]),
     ("ray", &["exact", "math", "simd"]),
@@ -39,8 +39,8 @@ const HOUSE: &[(&str, &[&str])] = &[
     (
         "bvh",
         &[
-            "block", "caller", "error", "math", "point", "prim", "query", "ray", "scene", "simd",
-            "storage",
+            "block", "caller", "error", "kinds", "math", "point", "prim", "query", "ray", "scene",
+            "simd", "storage",
         ],
     ),
     ("surface", &["exact", "instance", "interval", "math"]),

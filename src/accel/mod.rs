@@ -131,7 +131,7 @@ impl<'m> Accel<'m> {
         if self.0.has_level() {
             return self.intersect_levels(ray);
         }
-        trace::ask(self.0, ray, ClosestHit::<Exact, _, MEMORY>::new(Choice::EVERYTHING, ()))
+        trace::closest_hit::<Exact, _>(self.0, ray, Choice::EVERYTHING, ())
     }
 
     /// Whether anything is hit: true exactly when [`intersect`](Self::intersect) finds a hit.
@@ -140,7 +140,26 @@ impl<'m> Accel<'m> {
         if self.0.has_level() {
             return self.occluded_levels(ray);
         }
-        trace::ask(self.0, ray, AnyHit::<Exact, _>::new(Choice::EVERYTHING, ()))
+        trace::any_hit::<Exact, _>(self.0, ray, Choice::EVERYTHING, ())
+    }
+
+    /// [`intersect_with`](Self::intersect_with) in [`Precision::Watertight`], and nothing left out: for programs with no room for the code of the
+    /// exact answer, which this does not name.
+    pub fn intersect_watertight(&self, ray: &Ray) -> Option<Hit> {
+        if self.0.has_level() {
+            let options = QueryOptions { precision: Precision::Watertight, ..Default::default() };
+            return levels::closest::<Watertight, _>(self.0, ray, &options, ());
+        }
+        trace::closest_hit::<Watertight, _>(self.0, ray, Choice::EVERYTHING, ())
+    }
+
+    /// Whether anything is hit: true exactly when [`intersect_watertight`](Self::intersect_watertight) finds a hit.
+    pub fn occluded_watertight(&self, ray: &Ray) -> bool {
+        if self.0.has_level() {
+            let options = QueryOptions { precision: Precision::Watertight, ..Default::default() };
+            return levels::any::<Watertight, _>(self.0, ray, &options, ());
+        }
+        trace::any_hit::<Watertight, _>(self.0, ray, Choice::EVERYTHING, ())
     }
 
     /// The closest hit among what `options` leaves.
@@ -243,12 +262,8 @@ impl<'m> Accel<'m> {
             };
         }
         match options.precision {
-            Precision::Exact => {
-                trace::ask(block, ray, ClosestHit::<Exact, _, MEMORY>::new(choice, watch))
-            }
-            Precision::Watertight => {
-                trace::ask(block, ray, ClosestHit::<Watertight, _, MEMORY>::new(choice, watch))
-            }
+            Precision::Exact => trace::closest_hit::<Exact, _>(block, ray, choice, watch),
+            Precision::Watertight => trace::closest_hit::<Watertight, _>(block, ray, choice, watch),
         }
     }
 
@@ -262,10 +277,8 @@ impl<'m> Accel<'m> {
             };
         }
         match options.precision {
-            Precision::Exact => trace::ask(block, ray, AnyHit::<Exact, _>::new(choice, watch)),
-            Precision::Watertight => {
-                trace::ask(block, ray, AnyHit::<Watertight, _>::new(choice, watch))
-            }
+            Precision::Exact => trace::any_hit::<Exact, _>(block, ray, choice, watch),
+            Precision::Watertight => trace::any_hit::<Watertight, _>(block, ray, choice, watch),
         }
     }
 

@@ -1,11 +1,46 @@
-//! What a traversal of bundles comes back to.
+//! What traversals come back to.
 
 #![allow(unsafe_code, reason = "a large array is not worth writing before it is needed")]
 
 use core::mem::MaybeUninit;
 
+use super::MAX_DEPTH;
 use crate::block::bundle::ChildRef;
 use crate::simd::{Simd, Width};
+
+/// Nodes to come back to, each with the `t` at which the ray enters it. Those below `count` are written.
+pub(super) struct Pending {
+    entries: [MaybeUninit<(u32, f32)>; MAX_DEPTH],
+    count: usize,
+}
+
+impl Pending {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Pending { entries: [const { MaybeUninit::uninit() }; MAX_DEPTH], count: 0 }
+    }
+
+    #[inline(always)]
+    pub fn push(&mut self, node: u32, near: f32) {
+        if let Some(entry) = self.entries.get_mut(self.count) {
+            entry.write((node, near));
+            self.count += 1;
+        }
+    }
+
+    /// The last node pushed that the ray enters before `t_bound`.
+    #[inline(always)]
+    pub fn pop(&mut self, t_bound: f32) -> Option<u32> {
+        loop {
+            self.count = self.count.checked_sub(1)?;
+            // SAFETY: a push wrote it, and counted it afterwards.
+            let (node, near) = unsafe { self.entries.get(self.count)?.assume_init() };
+            if near <= t_bound {
+                return Some(node);
+            }
+        }
+    }
+}
 
 /// Room for a [`Stack`].
 pub(crate) struct Columns<const ROOM: usize> {

@@ -1,6 +1,6 @@
 //! The one loop over the tree.
 
-use super::MAX_DEPTH;
+use super::stack::Pending;
 use crate::block::BvhNode;
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
@@ -20,7 +20,7 @@ pub(crate) fn traverse<S: Simd, Q: Query>(
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    let mut stack = Stack { entries: [(0, 0.0); MAX_DEPTH], count: 0 };
+    let mut stack = Pending::new();
     let Some(mut node) = nodes.first() else { return false };
     query.watch().step();
     if slab.part(&node.aabb(), query.t_bound()).is_empty() {
@@ -49,7 +49,7 @@ fn nearer_child<'n, Q: Query>(
     first: u32,
     slab: &impl Slab,
     query: &mut Q,
-    stack: &mut Stack,
+    stack: &mut Pending,
 ) -> Option<&'n BvhNode> {
     let [left, right] = nodes.get(first as usize..)?.first_chunk::<2>()?;
     query.watch().step();
@@ -67,32 +67,6 @@ fn nearer_child<'n, Q: Query>(
         (false, false) => {
             stack.push(first, a.near);
             Some(right)
-        }
-    }
-}
-
-/// Nodes to come back to, each with the `t` at which the ray enters it.
-struct Stack {
-    entries: [(u32, f32); MAX_DEPTH],
-    count: usize,
-}
-
-impl Stack {
-    fn push(&mut self, node: u32, near: f32) {
-        if let Some(entry) = self.entries.get_mut(self.count) {
-            *entry = (node, near);
-            self.count += 1;
-        }
-    }
-
-    /// The last node pushed that the ray enters before `t_bound`.
-    fn pop(&mut self, t_bound: f32) -> Option<u32> {
-        loop {
-            self.count = self.count.checked_sub(1)?;
-            let (node, near) = *self.entries.get(self.count)?;
-            if near <= t_bound {
-                return Some(node);
-            }
         }
     }
 }

@@ -9,6 +9,7 @@ use super::spatial::{best_cut, overlap};
 use super::split::{Areas, Extent};
 use super::sweep::{FEW, sweep};
 use crate::block::BvhNode;
+use crate::kinds::{SPHERES, WIDE};
 use crate::math::Aabb;
 use crate::prim::{Shapes, Source};
 
@@ -192,7 +193,8 @@ impl Splitter<'_, '_, '_> {
         if task.count < CUT_FROM || task.room == task.count {
             return Some(split);
         }
-        let Some(shapes) = &mut scratch.shapes else { return Some(split) };
+        // Compact trees are not cut.
+        let Some(shapes) = scratch.shapes.as_mut().filter(|_| WIDE) else { return Some(split) };
         Some(self.cut(slots, task, &split, shapes).unwrap_or(split))
     }
 
@@ -231,7 +233,7 @@ impl Splitter<'_, '_, '_> {
             Some(split) => Some(split),
             None if may_be_leaf => None,
             // Few, but of two kinds: each kind can be one leaf.
-            None if count <= leaf_max => {
+            None if SPHERES && count <= leaf_max => {
                 refs.sort_unstable_by_key(|r| (r.is_sphere(), r.id()));
                 Some(split_at(refs, count - spheres, [1, 1]))
             }

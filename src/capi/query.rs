@@ -56,6 +56,46 @@ pub unsafe extern "C" fn rt_occluded(accel: *const RtAccel, ray: *const RtRay) -
     answer(|| ask().unwrap_or(false), false)
 }
 
+/// `rt_intersect` with RT_PRECISION_WATERTIGHT: no code of the exact answer is linked for it.
+///
+/// # Safety
+///
+/// Every pointer is null or valid, and nobody else uses `*hit` during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rt_intersect_watertight(
+    accel: *const RtAccel,
+    ray: *const RtRay,
+    hit: *mut RtHit,
+) -> bool {
+    let ask = || -> Result<bool, Error> {
+        // SAFETY: the caller's promise.
+        let accel = unsafe { accel_at(accel) }?;
+        // SAFETY: the caller's promise.
+        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
+        let found = accel.intersect_watertight(ray);
+        // SAFETY: not null, aligned, and valid as the caller promises.
+        unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
+        Ok(found.is_some())
+    };
+    answer(|| ask().unwrap_or(false), false)
+}
+
+/// `rt_occluded` with RT_PRECISION_WATERTIGHT: true exactly when `rt_intersect_watertight` is.
+///
+/// # Safety
+///
+/// Both pointers are null or valid.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rt_occluded_watertight(accel: *const RtAccel, ray: *const RtRay) -> bool {
+    let ask = || -> Result<bool, Error> {
+        // SAFETY: the caller's promise.
+        let accel = unsafe { accel_at(accel) }?;
+        // SAFETY: the caller's promise.
+        Ok(accel.occluded_watertight(unsafe { ray_at(ray) }?))
+    };
+    answer(|| ask().unwrap_or(false), false)
+}
+
 /// `rt_intersect` for what `query` leaves; null leaves everything. When the query is refused, for a
 /// reason that `rt_query_check` tells: false, and nothing is written.
 ///

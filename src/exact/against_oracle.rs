@@ -54,6 +54,7 @@ fn judge(seen: &mut Seen, lines: &[Line], meetings: &[Meeting], limits: &[f32], 
             met.push((ours, real, line, meeting));
         }
     }
+    judge_compact(lines, meetings, limits, seed);
     for (i, (p, p_real, line, meeting)) in met.iter().enumerate() {
         for (q, q_real, other_line, other) in &met[i..] {
             let order = p_real.cmp(q_real);
@@ -69,6 +70,72 @@ fn judge(seen: &mut Seen, lines: &[Line], meetings: &[Meeting], limits: &[f32], 
             seen.sphere_ties += usize::from(tie && (round(meeting) || round(other)));
         }
     }
+}
+
+/// A number as processors of 32 bits have it.
+enum Compact {
+    Quotient(compact::Quotient),
+    Root(compact::Root),
+}
+
+impl Compact {
+    fn new(line: &Line, meeting: &Meeting) -> Option<Self> {
+        match *meeting {
+            Meeting::Triangle(corners) => {
+                compact::Quotient::new(line, corners).map(Compact::Quotient)
+            }
+            Meeting::Sphere { centre, radius, root } => {
+                compact::Root::new(line, centre, radius, root).map(Compact::Root)
+            }
+        }
+    }
+
+    fn approximate(&self) -> (f64, f64) {
+        match self {
+            Compact::Quotient(t) => t.approximate(),
+            Compact::Root(t) => t.approximate(),
+        }
+    }
+
+    fn compare(&self, other: &Compact) -> Ordering {
+        match (self, other) {
+            (Compact::Quotient(p), Compact::Quotient(q)) => p.compare(q),
+            (Compact::Quotient(p), Compact::Root(q)) => q.compare_with(p).reverse(),
+            (Compact::Root(p), Compact::Quotient(q)) => p.compare_with(q),
+            (Compact::Root(p), Compact::Root(q)) => p.compare(q),
+        }
+    }
+}
+
+/// The same of these numbers.
+fn judge_compact(lines: &[Line], meetings: &[Meeting], limits: &[f32], seed: &str) {
+    let mut met = Vec::new();
+    for (line, meeting) in lines.iter().flat_map(|l| meetings.iter().map(move |m| (l, m))) {
+        let place = || std::format!("compact, {seed}: {line:?} {meeting:?}");
+        let (ours, real) = (Compact::new(line, meeting), oracle_root(line, meeting));
+        assert_eq!(ours.is_some(), real.is_some(), "{}", place());
+        let Some((ours, real)) = ours.zip(real) else { continue };
+        for limit in limits {
+            let float = Compact::Quotient(compact::Quotient::float(Binary::of(*limit)));
+            let order = real.cmp(&RealRoot::float(*limit));
+            assert_eq!(ours.compare(&float), order, "limit {limit:e}, {}", place());
+        }
+        judge_size(ours.approximate(), &real, &place());
+        for (other, other_real) in &met {
+            assert_eq!(ours.compare(other), real.cmp(other_real), "{}", place());
+        }
+        met.push((ours, real));
+    }
+}
+
+/// A `t` in `f64`, and its bound.
+fn judge_size((t, error): (f64, f64), real: &RealRoot, place: &str) {
+    let one = Dyadic::from_f32(1.0);
+    let float = |x: f64| RealRoot::rational(Dyadic::from_f64(x), one.clone());
+    assert!(error <= 5.0 * UNIT * t.abs(), "{t:e} +- {error:e}, {place}");
+    // The sums round, by less than one unit in the last place of `t`.
+    let (low, high) = (float((t - error).next_down()), float((t + error).next_up()));
+    assert!(low <= *real && *real <= high, "{t:e} +- {error:e}, {place}");
 }
 
 fn neighbours(x: f32) -> impl Iterator<Item = f32> {
@@ -90,11 +157,7 @@ fn judge_one(
     }
     let one = Dyadic::from_f32(1.0);
     let float = |x: f64| RealRoot::rational(Dyadic::from_f64(x), one.clone());
-    let (t, error) = ours.approximate();
-    assert!(error <= 5.0 * UNIT * t.abs(), "{t:e} +- {error:e}, {place}");
-    // The sums round, by less than one unit in the last place of `t`.
-    let (low, high) = (float((t - error).next_down()), float((t + error).next_up()));
-    assert!(low <= *real && *real <= high, "{t:e} +- {error:e}, {place}");
+    judge_size(ours.approximate(), real, place);
     // Beyond the middle of the largest float and 2^128 lies infinity.
     let end = 2f64.powi(128) - 2f64.powi(103);
     let rounded = match (real.cmp(&float(end)), real.cmp(&float(-end))) {
@@ -110,14 +173,18 @@ fn judge_triangle(line: &Line, triangle: Triangle, seed: &str) {
     let (o, d) = (vector(line.origin), vector(line.direction));
     let [a, b, c] = triangle.map(|p| difference(&vector(p), &o));
     let real = [(&c, &a), (&a, &b), (&b, &c)].map(|(p, q)| dot(&d, &cross(p, q)));
-    for (ours, real) in volumes(line, triangle).into_iter().zip(real) {
+    let [short, long] = [compact::volumes(line, triangle), volumes(line, triangle)];
+    for (ours, real) in long.into_iter().chain(short).zip(real.iter().cycle()) {
         let ours = Dyadic::from_f64(ours);
         assert_eq!(ours.sign(), real.sign(), "{seed}: {line:?} {triangle:?}");
-        let error = &(&ours - &real).abs() * &Dyadic::from_f64(0.99 / UNIT);
-        assert!(error <= real.abs(), "{seed}: {line:?} {triangle:?}");
+        let error = &(&ours - real).abs() * &Dyadic::from_f64(0.99 / UNIT);
+        assert!(error <= real.clone().abs(), "{seed}: {line:?} {triangle:?}");
     }
     let n = cross(&difference(&b, &a), &difference(&c, &a));
-    assert_eq!(has_area(triangle), n.iter().any(|x| x.sign() != 0), "{seed}: {triangle:?}");
+    for ours in [has_area(triangle), compact::has_area(triangle)] {
+        assert_eq!(ours, n.iter().any(|x| x.sign() != 0), "{seed}: {triangle:?}");
+    }
+    assert_eq!(compact::normal(triangle), normal(triangle), "{seed}: {triangle:?}");
 }
 
 /// Two lines from one point, and what they may meet.

@@ -8,24 +8,35 @@
 
 #[cfg(test)]
 mod against_oracle;
+#[cfg(any(test, not(target_pointer_width = "64")))]
+mod compact;
 #[cfg(test)]
 mod speed;
 mod sphere;
 #[cfg(test)]
 mod tests;
+#[cfg_attr(
+    not(target_pointer_width = "64"),
+    allow(dead_code, reason = "only spheres need it there")
+)]
 mod triangle;
 mod two_roots;
 mod units;
 
 use core::cmp::Ordering;
 
+#[cfg(not(target_pointer_width = "64"))]
+use compact::{Quotient, Root};
+#[cfg(not(target_pointer_width = "64"))]
+pub(crate) use compact::{has_area, normal, volumes};
 pub(crate) use sphere::{Roots, from_centre};
+#[cfg(target_pointer_width = "64")]
 pub(crate) use triangle::{has_area, normal, volumes};
+#[cfg(target_pointer_width = "64")]
+use {sphere::Root, triangle::Quotient};
 
 use crate::kinds::SPHERES;
 use crate::math::binary::Binary;
-use sphere::Root;
-use triangle::Quotient;
 
 /// The points `origin + t * direction`, in the floats that were given.
 #[derive(Clone, Copy, Debug)]
@@ -84,8 +95,7 @@ impl Distance {
             Meeting::Triangle(corners) => Quotient::new(line, corners).map(Distance::Quotient),
             Meeting::Sphere { .. } if !SPHERES => None,
             Meeting::Sphere { centre, radius, root } => {
-                let roots = Roots::new(line, centre, radius)?;
-                Some(Distance::Root(Root::new(roots, root)))
+                Root::new(line, centre, radius, root).map(Distance::Root)
             }
         }
     }

@@ -113,8 +113,9 @@ pub(crate) struct Root {
 }
 
 impl Root {
-    pub fn new(roots: Roots, root: usize) -> Self {
-        Root { roots, far: root == 1 }
+    /// `root` 0 where the line enters, 1 where it leaves; `None` when it misses.
+    pub fn new(line: &Line, centre: [f32; 3], radius: f32, root: usize) -> Option<Self> {
+        Some(Root { roots: Roots::new(line, centre, radius)?, far: root == 1 })
     }
 
     pub fn approximate(&self) -> (f64, f64) {

@@ -40,22 +40,28 @@ impl<D: Doubles> PlaneMeeting<D> {
     }
 }
 
-#[inline(always)]
+// On a processor of 32 bits each operation is a call, or many instructions: there these are calls as well.
+
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
 fn minus<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> Vector<D> {
     [ax.sub(bx), ay.sub(by), az.sub(bz)]
 }
 
-#[inline(always)]
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
 fn cross<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> Vector<D> {
     [ay.mul(bz).sub(by.mul(az)), az.mul(bx).sub(bz.mul(ax)), ax.mul(by).sub(bx.mul(ay))]
 }
 
-#[inline(always)]
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
 fn dot<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> D {
     ax.mul(bx).add(ay.mul(by)).add(az.mul(bz))
 }
 
-#[inline(always)]
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
 fn sum_abs<D: Doubles>([x, y, z]: Vector<D>) -> D {
     x.abs().add(y.abs()).add(z.abs())
 }

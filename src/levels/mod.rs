@@ -15,7 +15,7 @@ use crate::block::Finished;
 use crate::block::level::{InstanceRecord, Level};
 use crate::query::{Choice, Counts, Decide, Exact, QueryOptions, Watch, Watertight, shares_bit};
 use crate::ray::{Hit, NONE, Ray};
-use crate::trace::{AnyHit, ClosestHit, ClosestMet, MEMORY, ask};
+use crate::trace::{ClosestMet, any_hit, ask, closest_hit};
 
 pub(crate) use reach::visit_reached;
 pub(crate) use together::{any_of_each, closest_of_each};
@@ -33,8 +33,8 @@ pub(crate) fn closest<D: Across, W: Watch>(
         if place.is_empty() {
             return None;
         }
-        let question = ClosestHit::<D, _, MEMORY>::new(place.choice(options), watch.lend());
-        let hit = ask(place.block, ray, question)?;
+        let choice = place.choice(options);
+        let hit = closest_hit::<D, _>(place.block, ray, choice, watch.lend())?;
         Some(Hit { instance: place.instance, ..hit })
     };
     let own = Shown::own(block);
@@ -71,8 +71,8 @@ pub(crate) fn any<D: Decide, W: Watch>(
 ) -> bool {
     let Some(level) = block.level() else { return false };
     let mut is_hit_in = |place: &Shown, ray: &Ray| {
-        let question = AnyHit::<D, _>::new(place.choice(options), watch.lend());
-        !place.is_empty() && ask(place.block, ray, question)
+        let choice = place.choice(options);
+        !place.is_empty() && any_hit::<D, _>(place.block, ray, choice, watch.lend())
     };
     if is_hit_in(&Shown::own(block), ray) {
         return true;

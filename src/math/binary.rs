@@ -4,7 +4,7 @@
 ///
 /// Finite floats are multiples of `2^-149` below `2^128`. Infinity and NaN, from a block of foreign
 /// bytes, are read as their bits say, as numbers below `2^129`, so that nothing here lacks meaning.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Binary {
     pub mantissa: i32,
     pub exponent: i32,

@@ -2,6 +2,30 @@
 //!
 //! All of them are exact or correctly rounded, or use nothing but such operations, so all choices give the same bits.
 
+/// Whether each operation on a `f64` is a call of a hundred instructions: on microcontrollers.
+pub(crate) const SLOW_F64: bool = cfg!(all(target_os = "none", target_pointer_width = "32"));
+
+/// And each operation on an `f32` a call of half a hundred.
+const SLOW_F32: bool = SLOW_F64
+    && cfg!(any(target_abi = "eabi", all(target_arch = "riscv32", not(target_feature = "f"))));
+
+/// `x < y`, of numbers.
+#[inline(always)]
+pub(crate) fn less(x: f32, y: f32) -> bool {
+    if SLOW_F32 { less_by_bits(x, y) } else { x < y }
+}
+
+/// The same by the order of their bits, whatever that says of NaN.
+#[inline(always)]
+fn less_by_bits(x: f32, y: f32) -> bool {
+    let rank = |x: f32| match x.to_bits() as i32 {
+        bits @ 0.. => bits,
+        // Below zero in the order of sizes; -0 becomes 0.
+        bits => i32::MIN.wrapping_sub(bits),
+    };
+    rank(x) < rank(y)
+}
+
 /// The correctly rounded square root.
 pub(crate) fn sqrt(x: f64) -> f64 {
     #[cfg(feature = "std")]
@@ -42,7 +66,17 @@ pub(crate) fn power_of_two(n: i32) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::cube_root;
+    use super::{cube_root, less_by_bits};
+
+    #[test]
+    fn bits_are_in_the_order_of_numbers() {
+        let sizes = [0.0, 1e-45, 2e-45, 1e-38, 0.5, 1.0, 1f32.next_up(), f32::MAX, f32::INFINITY];
+        for x in sizes.into_iter().flat_map(|x| [x, -x]) {
+            for y in sizes.into_iter().flat_map(|y| [y, -y]) {
+                assert_eq!(less_by_bits(x, y), x < y, "{x} {y}");
+            }
+        }
+    }
 
     #[test]
     fn cube_roots_are_near() {

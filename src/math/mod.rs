@@ -4,6 +4,8 @@ pub(crate) mod aabb;
 pub(crate) mod binary;
 mod bits;
 pub(crate) mod error_free;
+#[cfg(any(test, not(target_pointer_width = "64")))]
+pub(crate) mod fixed;
 pub(crate) mod float;
 pub(crate) mod integer;
 pub(crate) mod rounding;

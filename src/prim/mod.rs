@@ -25,8 +25,8 @@ use crate::kinds::SPHERES;
 use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
-use crate::sieve::{self, Triangles};
-use crate::simd::{Kernel, Simd};
+use crate::sieve::{self, Single, Triangles};
+use crate::simd::{Kernel, SMALL, Simd};
 
 /// The leaf blocks of one accel.
 #[derive(Clone, Copy)]
@@ -153,8 +153,10 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
-        let look = Look { block, number, lanes, ray, query };
-        if S::SMALL { s.run(look) } else { look.run(s) }
+        if SMALL {
+            return one_by_one(block, number as u32, lanes, ray, query);
+        }
+        Look { block, number, lanes, ray, query }.run(s)
     }
 
     #[inline(never)]
@@ -181,6 +183,27 @@ impl Leaves<'_> {
             })
         })
     }
+}
+
+/// Offers `query` what the ray meets among some lanes of a block, one after the other: in little code. Their order matters
+/// to no answer.
+#[inline(never)]
+fn one_by_one<Q: Query>(
+    block: &TriangleBlock,
+    number: u32,
+    lanes: u32,
+    ray: &PreparedRay,
+    query: &mut Q,
+) -> bool {
+    query.watch().block(lanes.count_ones());
+    let Some(sieve) = Single::new(ray, query.t_bound(), block) else { return false };
+    Bits(lanes).any(|lane| {
+        let lane = lane as u32;
+        let Some(left) = sieve.look(lane) else { return false };
+        let place = Place::of_lane(number, block.first, lane);
+        let inside = query.wants_inside() && sieve.is_inside(&left);
+        query.triangle(ray, &TriangleLane { block, place, sure: left.sure, inside })
+    })
 }
 
 /// The first look at the triangles of a block.
@@ -251,15 +274,14 @@ impl<Q: Query> Kernel for Several<'_, Q> {
         }
         let mut rest = candidates;
         while rest != 0 {
-            // The order matters to no answer.
-            let lane = if S::SMALL { rest.trailing_zeros() } else { found.nearest(s, rest) };
+            let lane = found.nearest(s, rest);
             rest &= !(1 << lane);
             let certain = Certain { sure: sure >> lane & 1 == 1, inside: false };
             if consider(block, number, lane, certain, ray, query) {
                 return true;
             }
             // What was found in a lane may be nearer than others.
-            if !S::SMALL && rest != 0 && query.t_bound() < t_bound {
+            if rest != 0 && query.t_bound() < t_bound {
                 rest &= found.up_to(s, ray, query.t_bound());
             }
         }

@@ -26,8 +26,10 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
         }
     }
 
-    #[inline(always)]
-    fn consider(&mut self, ray: &PreparedRay, met: D::Met) {
+    /// In line where room is no matter.
+    #[cfg_attr(target_pointer_width = "64", inline(always))]
+    #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
+    fn consider(&mut self, ray: &PreparedRay, met: &D::Met) {
         if !self.filter.faces(met.front()) {
             return;
         }
@@ -35,12 +37,12 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
             // The grid offers a primitive once for each cell that holds it.
             let known = met.place() == best.place() && met.root() == best.root();
             let (prim_ids, memory) = (self.filter.prim_ids, self.memory.first_mut());
-            if known || !D::is_before(ray, &met, best, prim_ids, memory, &mut self.watch) {
+            if known || !D::is_before(ray, met, best, prim_ids, memory, &mut self.watch) {
                 return;
             }
         }
-        self.best = Some(met);
-        let t_bound = D::t_bound(ray, &met);
+        self.best = Some(*met);
+        let t_bound = D::t_bound(ray, met);
         if t_bound < self.t_bound {
             self.t_bound = t_bound;
         }
@@ -69,7 +71,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         };
         if !known
             && self.filter.sees(lane.place, true)
-            && let Some(met) = D::triangle(ray, lane, &mut self.watch)
+            && let Some(met) = &D::triangle(ray, lane, &mut self.watch)
         {
             self.consider(ray, met);
         }
@@ -80,7 +82,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         if self.filter.sees(lane.place, false) {
             for met in D::sphere(ray, lane, &mut self.watch).into_iter().flatten() {
                 if self.filter.sees(lane.place, met.skippable()) {
-                    self.consider(ray, met);
+                    self.consider(ray, &met);
                 }
             }
         }
@@ -140,6 +142,49 @@ impl<D: Decide, W: Watch> Query for Any<'_, D, W> {
     #[inline(always)]
     fn watch(&mut self) -> &mut W {
         &mut self.watch
+    }
+}
+
+/// [`Closest`], or [`Any`] if `any` says so: the same code for both.
+pub(crate) struct Either<'m, D: Decide, W> {
+    pub closest: Closest<'m, D, W, 0>,
+    pub any: bool,
+}
+
+impl<D: Decide, W: Watch> Query for Either<'_, D, W> {
+    type Watch = W;
+    const ANY_BOXES: bool = D::ANY_BOXES;
+    const ORDERED: bool = true;
+
+    #[inline(always)]
+    fn wants_inside(&self) -> bool {
+        self.any
+    }
+
+    #[inline(always)]
+    fn t_bound(&self) -> f32 {
+        self.closest.t_bound
+    }
+
+    #[inline(always)]
+    fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        let filter = &self.closest.filter;
+        // Neither `t` nor side is needed of what is surely hit.
+        if lane.inside && filter.both_sides() && filter.sees(lane.place, true) {
+            return true;
+        }
+        self.closest.triangle(ray, lane);
+        self.any && self.closest.best.is_some()
+    }
+
+    fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
+        self.closest.sphere(ray, lane);
+        self.any && self.closest.best.is_some()
+    }
+
+    #[inline(always)]
+    fn watch(&mut self) -> &mut W {
+        &mut self.closest.watch
     }
 }
 

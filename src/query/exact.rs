@@ -9,7 +9,7 @@ use crate::interval::plane::PlaneMeeting;
 use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
 use crate::ray::{Interval, PreparedRay};
-use crate::simd::{Doubles, Lanes, Simd, Width};
+use crate::simd::{Doubles, Lanes, SMALL, Simd, Width};
 
 /// Hit or miss, the primitive and the order of real arithmetic; `t` correctly rounded.
 #[derive(Clone, Copy)]
@@ -100,7 +100,7 @@ impl ExactMet {
     /// Whether the real `t` is within the ray's limits, in real arithmetic.
     #[cold]
     #[inline(never)]
-    fn is_within(self, ray: &PreparedRay) -> bool {
+    fn is_within(&self, ray: &PreparedRay) -> bool {
         Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
             t.compare_with(ray.given.t_min) != Ordering::Less
                 && t.compare_with(ray.given.t_max) != Ordering::Greater
@@ -111,7 +111,7 @@ impl ExactMet {
     #[cold]
     #[inline(never)]
     fn is_really_before(
-        self,
+        &self,
         ray: &PreparedRay,
         best: &ExactMet,
         prim_ids: &[u32],
@@ -126,10 +126,10 @@ impl ExactMet {
         watch.exact();
         let distance = |met: &ExactMet| Distance::new(&ray.line(), &met.meeting);
         let order = match memory {
-            Some(memory) => {
-                distance(&self).zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best))
+            Some(memory) if !SMALL => {
+                distance(self).zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best))
             }
-            None => distance(&self).zip(distance(best)).map(|(mine, best)| mine.compare(&best)),
+            _ => distance(self).zip(distance(best)).map(|(mine, best)| mine.compare(&best)),
         };
         match order {
             Some(Ordering::Less) => true,
@@ -143,7 +143,7 @@ impl ExactMet {
     /// The nearest float to the real `t`, in real arithmetic.
     #[cold]
     #[inline(never)]
-    fn rounded(self, ray: &PreparedRay) -> f32 {
+    fn rounded(&self, ray: &PreparedRay) -> f32 {
         Distance::new(&ray.line(), &self.meeting).map_or(self.t as f32, |t| t.round())
     }
 }
@@ -251,7 +251,9 @@ impl Decide for Exact {
     const ANY_BOXES: bool = true;
     type Memory = ExactMemory;
 
-    #[inline(always)]
+    /// In line where room is no matter.
+    #[cfg_attr(target_pointer_width = "64", inline(always))]
+    #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
     fn triangle(
         ray: &PreparedRay,
         lane: &TriangleLane,

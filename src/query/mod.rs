@@ -10,7 +10,7 @@ mod hits;
 mod options;
 mod watertight;
 
-pub(crate) use ask::{Any, Closest, Locate, Wanted};
+pub(crate) use ask::{Any, Closest, Either, Locate, Wanted};
 pub(crate) use exact::{Exact, ExactMet, SureMeetings};
 pub(crate) use hits::NextHits;
 pub(crate) use options::shares_bit;
@@ -150,6 +150,12 @@ pub(crate) trait Query {
 
     /// Whether near nodes had better come first.
     const ORDERED: bool;
+
+    /// Whether it matters if a triangle surely is met within the limits: to those that want any hit.
+    #[inline(always)]
+    fn wants_inside(&self) -> bool {
+        !Self::ORDERED
+    }
 
     /// Nothing beyond this `t` of the frame is of interest any more.
     fn t_bound(&self) -> f32;

@@ -108,8 +108,7 @@ impl Decide for Watertight {
 
     fn t(ray: &PreparedRay, met: &WatertightMet, _: &mut impl Watch) -> f32 {
         // Out of the frame; what rounding at the limits moved goes back between them.
-        let t = (f64::from(met.t) / ray.t_scale) as f32;
-        limit(t, ray.given.t_min, ray.given.t_max) + 0.0
+        limit(ray.given_t(met.t), ray.given.t_min, ray.given.t_max) + 0.0
     }
 
     fn weights(met: &WatertightMet) -> [f32; 2] {

@@ -6,7 +6,7 @@ use raykern_harness::make::Random;
 use raykern_harness::oracle::dyadic::Dyadic;
 use raykern_harness::search::{Worst, samples};
 
-use super::{NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
+use super::{FrameSlab, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
 use crate::simd::Scalar;
@@ -97,7 +97,9 @@ fn boxes_hold(random: &mut Random, ray: &PreparedRay, reach: f32) -> bool {
         })
     };
     let narrow = narrow(ray, reach);
+    let framed = FrameSlab::new(ray, reach);
     holds(&|bound| WideSlab::new(ray).part(&aabb, bound))
+        && holds(&|bound| framed.part(&aabb, bound))
         && narrow.is_none_or(|slab| holds(&|bound| slab.part(&aabb, bound)))
 }
 

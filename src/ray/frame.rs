@@ -4,8 +4,8 @@ use super::slab::{NarrowSlab, Scales};
 use super::{Axis, Ray};
 use crate::exact::Line;
 use crate::math::float::{narrow_power_of_two, power_of_two};
-use crate::math::rounding::{UNIT32, f32_above, f32_below};
-use crate::simd::{Lanes, Scalar, Simd, Width};
+use crate::math::rounding::{Round, UNIT32, f32_above, f32_below, scaled_by};
+use crate::simd::{Lanes, SMALL, Scalar, Simd, Width};
 
 /// A ray that can hit something, with what every box and primitive test needs of it.
 ///
@@ -106,7 +106,7 @@ pub(super) fn scale_below(x: f32) -> f32 {
 
 /// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
 /// infinities and NaN above the others.
-fn largest_bits(v: [f32; 3]) -> u32 {
+pub(super) fn largest_bits(v: [f32; 3]) -> u32 {
     let [x, y, z] = v.map(|x| x.to_bits() & !(1 << 31));
     x.max(y).max(z)
 }
@@ -140,6 +140,16 @@ fn above(t: f32, scale: f32) -> f32 {
         Some(product) if product < -f32::MAX => -f32::MAX,
         Some(product) => product,
         None => rarely(f32_above, t, scale),
+    }
+}
+
+/// `t * 2^n` of a finite `t`, which is a float unless it is not a normal one. Out of line, and without `f64`.
+#[inline(never)]
+fn rounded(t: f32, n: i32, round: Round) -> f32 {
+    let exact = if (-126..=127).contains(&n) { scaled(t, narrow_power_of_two(n)) } else { None };
+    match exact {
+        Some(product) if product.abs() <= f32::MAX => product,
+        _ => scaled_by(t, n, round),
     }
 }
 
@@ -214,16 +224,6 @@ impl Ray {
         Some((ray, slab))
     }
 
-    /// The same out of line, for a backend that shall be small.
-    #[inline(never)]
-    pub(crate) fn set_out_apart<S: Simd>(
-        &self,
-        s: S,
-        reach: f32,
-    ) -> Option<(LateRay<S>, NarrowSlab)> {
-        self.set_out(s, reach)
-    }
-
     /// The same with all that traversal needs.
     #[inline(always)]
     pub(crate) fn prepare_with<S: Simd>(
@@ -237,16 +237,19 @@ impl Ray {
 
     /// The same without boxes, of any ray that can hit something.
     pub(crate) fn prepare(&self, reach: f32) -> Option<PreparedRay> {
+        if SMALL {
+            return self.prepare_any(reach);
+        }
         match self.prepare_with(Scalar, reach) {
             Some((ray, _)) => Some(ray),
-            None => self.prepare_odd(reach),
+            None => self.prepare_any(reach),
         }
     }
 
-    /// What traversal needs of any ray, or `None` for one that hits nothing by definition.
-    #[cold]
+    /// What traversal needs of any ray, or `None` for one that hits nothing by definition. Ordinary rays get the same as from
+    /// [`prepare_with`](Self::prepare_with), by longer ways.
     #[inline(never)]
-    pub(crate) fn prepare_odd(&self, reach: f32) -> Option<PreparedRay> {
+    pub(crate) fn prepare_any(&self, reach: f32) -> Option<PreparedRay> {
         let (farthest, longest) = (largest_bits(self.origin), largest_bits(self.direction));
         let [t_min, t_max] = self.finite_limits();
         let finite = farthest < EXPONENT && longest < EXPONENT;
@@ -264,16 +267,16 @@ impl Ray {
         let direction = [x, y, z, 0.0];
         let [x, y, z] = self.origin.map(|x| x * scale);
         let origin = [x, y, z, 0.0];
-        let t_scale = power_of_two(length - lift - exponent);
-        let t_min_below = f32_below(f64::from(t_min) * t_scale);
+        let t_exponent = length - lift - exponent;
+        let t_min_below = rounded(t_min, t_exponent, Round::Below);
         Some(PreparedRay {
             given: Ray { t_min, t_max, ..*self },
             scale,
             origin,
             direction,
-            t_scale,
+            t_scale: power_of_two(t_exponent),
             t_min: t_min_below,
-            t_max: f32_above(f64::from(t_max) * t_scale),
+            t_max: rounded(t_max, t_exponent, Round::Above),
             shear: Shear::new(depth_axis(direction), &origin, &direction, scale, t_min_below),
         })
     }
@@ -418,7 +421,21 @@ impl PreparedRay {
     #[inline(always)]
     pub fn t_inside(&self) -> [f32; 2] {
         let Ray { t_min, t_max, .. } = self.given;
+        if SMALL {
+            let n = self.t_exponent();
+            return [rounded(t_min, n, Round::Above), rounded(t_max, n, Round::Below)];
+        }
         [f32_above(f64::from(t_min) * self.t_scale), f32_below(f64::from(t_max) * self.t_scale)]
+    }
+
+    /// The nearest given `t` to a finite one of the frame.
+    pub fn given_t(&self, t: f32) -> f32 {
+        rounded(t, -self.t_exponent(), Round::Nearest)
+    }
+
+    /// `t_scale` is `2^n`, which is normal.
+    fn t_exponent(&self) -> i32 {
+        (self.t_scale.to_bits() >> 52) as i32 - 1023
     }
 
     /// What lies between these depths, from the origin, surely is of interest.

@@ -14,7 +14,7 @@ pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
 pub(crate) use frame::{Late, PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, RayPacket, Spread};
-pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
+pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".
 pub const NONE: u32 = u32::MAX;

@@ -2,10 +2,12 @@
 
 use glam::DVec3;
 
+use super::frame::{SLOWEST, is_ordinary, largest_bits};
 use super::{Interval, PreparedRay};
+use crate::math::float::less;
 use crate::math::rounding::{UNIT32, f32_above, f32_below, gamma};
 use crate::math::{Aabb, wide};
-use crate::simd::{Lanes, Width, mul_sub};
+use crate::simd::{Lanes, SMALL, Scalar, Width, mul_sub};
 
 /// A ray made ready for boxes.
 ///
@@ -77,16 +79,12 @@ impl NarrowSlab {
         t_min: f32,
         backwards: [bool; 3],
     ) -> Self {
-        // What can be computed before the reciprocals are there, which takes the longest.
-        let scale = s.splat(scales.t);
-        let ahead = origin.mul(scale).flipped_by(direction);
-        let relative = s.splat(RELATIVE_PAD);
-        let pad = ahead.abs().mul(relative).add(s.splat(NEGLIGIBLE * (reach * scales.t)));
-        let constant = s.splat(CONSTANT_PAD * (reach * scales.space));
         let mut slab = NarrowSlab { t_min, backwards, ..Self::BLANK };
-        inverse.mul(scale).with_sign_of(direction).store(&mut slab.reciprocal);
-        inverse.mul(ahead.add(pad)).add(constant).store(&mut slab.near_shift);
-        inverse.mul(ahead.sub(pad)).sub(constant).store(&mut slab.far_shift);
+        let [reciprocal, near_shift, far_shift] =
+            walls::<S, 4>(s, [origin, direction, inverse], scales, reach);
+        reciprocal.store(&mut slab.reciprocal);
+        near_shift.store(&mut slab.near_shift);
+        far_shift.store(&mut slab.far_shift);
         slab
     }
 
@@ -107,7 +105,7 @@ impl NarrowSlab {
 }
 
 impl Slab for NarrowSlab {
-    /// No division, no branch.
+    /// No division, no branch, but where code shall be small, as operations take long there.
     fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
         let (mut near, mut far) = (self.t_min, t_bound);
         for k in 0..3 {
@@ -116,8 +114,11 @@ impl Slab for NarrowSlab {
             let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
             let enter = first * r - self.near_shift[k];
             let leave = last * r - self.far_shift[k];
-            near = if enter > near { enter } else { near };
-            far = if leave < far { leave } else { far };
+            near = if less(near, enter) { enter } else { near };
+            far = if less(leave, far) { leave } else { far };
+            if SMALL && less(far, near) {
+                break;
+            }
         }
         Interval { near, far }
     }
@@ -133,6 +134,27 @@ impl Slab for NarrowSlab {
             s,
         }
     }
+}
+
+/// The scaled reciprocals, and the shifts of near and far walls: see [`NarrowSlab`].
+#[inline(always)]
+fn walls<S: Width<N>, const N: usize>(
+    s: S,
+    [origin, direction, inverse]: [S::V; 3],
+    scales: Scales,
+    reach: f32,
+) -> [S::V; 3] {
+    // What can be computed before the reciprocals are there, which takes the longest.
+    let scale = s.splat(scales.t);
+    let ahead = origin.mul(scale).flipped_by(direction);
+    let relative = s.splat(RELATIVE_PAD);
+    let pad = ahead.abs().mul(relative).add(s.splat(NEGLIGIBLE * (reach * scales.t)));
+    let constant = s.splat(CONSTANT_PAD * (reach * scales.space));
+    [
+        inverse.mul(scale).with_sign_of(direction),
+        inverse.mul(ahead.add(pad)).add(constant),
+        inverse.mul(ahead.sub(pad)).sub(constant),
+    ]
 }
 
 #[inline(always)]
@@ -185,6 +207,66 @@ impl<S, V: Copy> NarrowBoxes<S, V> {
             near: mul_sub::<V, FUSED, N>(self.s.load(first), r, self.near_shift[k]),
             far: mul_sub::<V, FUSED, N>(self.s.load(last), r, self.far_shift[k]),
         }
+    }
+}
+
+/// Boxes in `f32` for any ray: in the ray's frame, to which they are scaled unless they are ordinary.
+///
+/// What a wall loses by that is below 2^-149 of what it is padded by. A wall that is infinite stays so.
+pub(crate) struct FrameSlab {
+    narrow: NarrowSlab,
+    scale: Option<f32>,
+}
+
+impl FrameSlab {
+    /// For boxes within `reach`, of which infinity says nothing.
+    #[inline(never)]
+    pub fn new(ray: &PreparedRay, reach: f32) -> Self {
+        let PreparedRay { given, scale, origin, direction, .. } = ray;
+        let [x, y, z, _] = *direction;
+        let slowest = largest([x, y, z]) * SLOWEST;
+        let reach = larger(larger(0.0, reach.min(f32::MAX)), largest(given.origin));
+        let is_ordinary = is_ordinary(reach);
+        let scales = Scales { t: 1.0, space: 1.0 };
+        let mut narrow = NarrowSlab { t_min: ray.t_min, ..NarrowSlab::BLANK };
+        for k in 0..3 {
+            let (o, d) = (origin[k], direction[k]);
+            let lines = [[o], [d], [1.0 / larger(d.abs(), slowest)]];
+            let [[reciprocal], [near_shift], [far_shift]] =
+                walls::<_, 1>(Scalar, lines, scales, reach * scale);
+            // Nothing is lost if boxes are scaled by this.
+            narrow.reciprocal[k] = if is_ordinary { reciprocal * scale } else { reciprocal };
+            narrow.near_shift[k] = near_shift;
+            narrow.far_shift[k] = far_shift;
+            narrow.backwards[k] = d.is_sign_negative();
+        }
+        FrameSlab { narrow, scale: (!is_ordinary).then_some(*scale) }
+    }
+}
+
+/// The largest size of these.
+fn largest(v: [f32; 3]) -> f32 {
+    f32::from_bits(largest_bits(v))
+}
+
+fn larger(x: f32, y: f32) -> f32 {
+    if x > y { x } else { y }
+}
+
+impl Slab for FrameSlab {
+    fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
+        match self.scale {
+            None => self.narrow.part(aabb, t_bound),
+            Some(scale) => {
+                let [lower, upper] = [aabb.lower, aabb.upper].map(|p| p.map(|x| x * scale));
+                self.narrow.part(&Aabb { lower, upper }, t_bound)
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn wide<'a, S: Width<N> + 'a, const N: usize>(&'a self, s: S) -> impl WideBoxes<S, N> + 'a {
+        (self, s)
     }
 }
 
@@ -252,7 +334,7 @@ impl Slab for WideSlab {
 }
 
 /// Lane by lane.
-impl<S: Width<N>, const N: usize> WideBoxes<S, N> for (&WideSlab, S) {
+impl<L: Slab, S: Width<N>, const N: usize> WideBoxes<S, N> for (&L, S) {
     fn entered<const FUSED: bool>(&self, walls: &[[f32; N]; 6], t_bound: S::V) -> (u32, S::V) {
         let (mut mask, mut near, mut bounds) = (0, [0.0; N], [0.0; N]);
         t_bound.store(&mut bounds);

@@ -191,10 +191,6 @@ impl<const N: usize> Meetings<[f32; N]> {
         }
     }
 
-    pub fn one(&self, lane: usize) -> Meetings<[f32; 1]> {
-        Meetings { total: [self.total[lane]], rise: [self.rise[lane]], error: [self.error[lane]] }
-    }
-
     pub fn set(&mut self, lane: usize, one: &Meetings<[f32; 1]>) {
         ([self.total[lane]], [self.rise[lane]], [self.error[lane]]) =
             (one.total, one.rise, one.error);

@@ -16,4 +16,4 @@ mod vector;
 pub(crate) use abreast::{Aim, Found, Opened, Sheared};
 pub(crate) use detail::detail;
 pub(crate) use sphere::{SphereDetail, sphere};
-pub(crate) use triangle::{Triangles, triangles};
+pub(crate) use triangle::{Single, Triangles, triangles};

@@ -26,23 +26,7 @@ impl<V: Lanes<16>> Triangles<V> {
     pub fn inside<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay) -> u32 {
         let [low, high] = ray.inner_depths();
         let window = self.middle.inner_window(Scalar, [[low], [high]]);
-        if S::SMALL {
-            return self.inside_one_by_one(window);
-        }
         self.sure & self.meetings.inside::<S, true, 16>(s, splat(s, window))
-    }
-
-    #[inline(never)]
-    fn inside_one_by_one(&self, window: [[f32; 1]; 2]) -> u32 {
-        let meetings = self.meetings.stored();
-        let (mut rest, mut inside) = (self.sure, 0);
-        while rest != 0 {
-            let lane = rest.trailing_zeros();
-            rest &= rest - 1;
-            let one = meetings.one(lane as usize % 16);
-            inside |= one.inside::<_, false, 1>(Scalar, window) << lane;
-        }
-        inside
     }
 
     /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
@@ -95,7 +79,7 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     let middle = Middle::of_one(ray, &block.aabb);
     let window = middle.window(Scalar, limits(ray, t_bound));
     let lanes = if middle.is_beyond(Scalar, window) == 0 { lanes } else { 0 };
-    if S::SMALL || S::FEW > 0 && lanes.count_ones() <= S::FEW {
+    if S::FEW > 0 && lanes.count_ones() <= S::FEW {
         return few(ray, middle, window, block, lanes).loaded(s);
     }
     let along = Along::new(s, ray, &block.vertices);
@@ -160,6 +144,82 @@ fn few(
     found
 }
 
+/// The same filter for one lane after the other, in little code.
+pub(crate) struct Single<'a> {
+    ray: &'a PreparedRay,
+    block: &'a TriangleBlock,
+    middle: Middle<[f32; 1]>,
+    window: [[f32; 1]; 2],
+}
+
+/// What is known of a lane that is left.
+pub(crate) struct Left {
+    /// See [`Triangles::sure`].
+    pub sure: bool,
+    meetings: Meetings<[f32; 1]>,
+}
+
+impl<'a> Single<'a> {
+    /// For a block that may have something up to `t_bound`.
+    #[inline(always)]
+    pub fn new(ray: &'a PreparedRay, t_bound: f32, block: &'a TriangleBlock) -> Option<Self> {
+        let middle = Middle::of_one(ray, &block.aabb);
+        let window = middle.window(Scalar, limits(ray, t_bound));
+        let is_beyond = middle.is_beyond(Scalar, window) != 0;
+        (!is_beyond).then_some(Single { ray, block, middle, window })
+    }
+
+    /// `None` for a lane that is not left.
+    #[inline(never)]
+    pub fn look(&self, lane: u32) -> Option<Left> {
+        let corners = Corners::new(self.ray, &self.middle, self.block.triangle(lane as usize));
+        let areas = corners.areas(self.ray, &self.middle);
+        if areas.outside(Scalar) != 0 {
+            return None;
+        }
+        let meetings = corners.meetings(&self.middle, &areas);
+        let outside = meetings.outside::<_, false, 1>(Scalar, self.window) != 0;
+        (!outside).then_some(Left { sure: areas.sure(Scalar) != 0, meetings })
+    }
+
+    /// Whether a sure lane surely is met within the ray's limits.
+    #[inline(never)]
+    pub fn is_inside(&self, left: &Left) -> bool {
+        let depths = self.ray.inner_depths().map(|depth| [depth]);
+        let window = self.middle.inner_window(Scalar, depths);
+        left.sure && left.meetings.inside::<_, false, 1>(Scalar, window) != 0
+    }
+}
+
+/// The corners of one triangle in the sheared space.
+struct Corners {
+    across: [Across<[f32; 1]>; 3],
+    /// From the middle of a box that holds it.
+    depths: [[f32; 1]; 3],
+}
+
+impl Corners {
+    #[inline(always)]
+    fn new(ray: &PreparedRay, middle: &Middle<[f32; 1]>, corners: [[f32; 3]; 3]) -> Self {
+        let corners = corners.map(|v| sheared(ray, v));
+        let depths = corners.map(|v| [v.0.raw[0] - middle.raw]);
+        Corners { across: corners.map(|v| v.1), depths }
+    }
+
+    #[inline(always)]
+    fn areas(&self, ray: &PreparedRay, middle: &Middle<[f32; 1]>) -> Areas<[f32; 1]> {
+        let [a, b, c] = [self.across[0].size(), self.across[1].size(), self.across[2].size()];
+        let error = AreaError::new(Scalar, [shared_error(ray, middle.deepest[0])]);
+        let error = error.of::<Scalar, false, 1>(Scalar, a.max(b).max(c));
+        Areas::new::<false, 1>(&self.across, error)
+    }
+
+    #[inline(always)]
+    fn meetings(&self, middle: &Middle<[f32; 1]>, areas: &Areas<[f32; 1]>) -> Meetings<[f32; 1]> {
+        Meetings::new::<Scalar, false, 1>(Scalar, middle.half, areas, self.depths)
+    }
+}
+
 /// What the filter computes of one triangle.
 pub(super) struct One {
     pub areas: Areas<[f32; 1]>,
@@ -170,14 +230,9 @@ impl One {
     /// For a box that holds it.
     #[inline(always)]
     pub fn new(ray: &PreparedRay, middle: &Middle<[f32; 1]>, corners: [[f32; 3]; 3]) -> One {
-        let corners = corners.map(|v| sheared(ray, v));
-        let depths = corners.map(|v| [v.0.raw[0] - middle.raw]);
-        let across = corners.map(|v| v.1);
-        let [a, b, c] = across.map(|v| v.size());
-        let error = AreaError::new(Scalar, [shared_error(ray, middle.deepest[0])]);
-        let error = error.of::<Scalar, false, 1>(Scalar, a.max(b).max(c));
-        let areas = Areas::new::<false, 1>(&across, error);
-        let meetings = Meetings::new::<Scalar, false, 1>(Scalar, middle.half, &areas, depths);
+        let corners = Corners::new(ray, middle, corners);
+        let areas = corners.areas(ray, middle);
+        let meetings = corners.meetings(middle, &areas);
         One { areas, meetings }
     }
 }

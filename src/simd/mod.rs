@@ -41,6 +41,11 @@ use core::sync::atomic::{AtomicU8, Ordering};
 pub(crate) use doubles::Doubles;
 pub(crate) use scalar::Scalar;
 
+/// Whether code had better be small than fast: where there are no vectors, lanes go one by one and questions share their
+/// code. Not where compilers make vectors of portable code.
+pub(crate) const SMALL: bool =
+    !cfg!(any(target_feature = "sse2", target_feature = "neon", target_feature = "simd128"));
+
 /// The number of each of sixteen lanes.
 pub(crate) const NUMBERS: [u32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
@@ -182,9 +187,6 @@ pub(crate) trait Width<const N: usize>: Copy {
 pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// So few lanes of 16 are faster one by one.
     const FEW: u32;
-
-    /// Whether code had better be small than fast: where there are no vectors, lanes go one by one and by calls.
-    const SMALL: bool = false;
 
     /// Whether batches trace rays together and keep several in flight: where vectors are fast enough to wait for memory. Elsewhere it
     /// would only be one more copy of the code.

@@ -3,6 +3,7 @@
 use core::mem::MaybeUninit;
 
 use super::{Kernel, Lanes, Simd, Width, corner};
+use crate::math::float::less;
 
 /// Portable code, one lane after the other.
 #[derive(Clone, Copy)]
@@ -152,12 +153,12 @@ impl<const N: usize> Lanes<N> for [f32; N] {
 
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        zip(self, other, |a, b| if a < b { a } else { b })
+        zip(self, other, |a, b| if less(a, b) { a } else { b })
     }
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        zip(self, other, |a, b| if a > b { a } else { b })
+        zip(self, other, |a, b| if less(b, a) { a } else { b })
     }
 
     #[inline(always)]
@@ -187,7 +188,7 @@ impl<const N: usize> Lanes<N> for [f32; N] {
 
     #[inline(always)]
     fn less(self, other: Self) -> u32 {
-        mask(self, other, |a, b| a < b)
+        mask(self, other, less)
     }
 
     #[inline(always)]
@@ -222,9 +223,6 @@ impl<const N: usize> Width<N> for Scalar {
 
 impl Simd for Scalar {
     const FEW: u32 = 8;
-
-    /// Not where compilers make vectors of this code.
-    const SMALL: bool = !cfg!(any(target_feature = "sse2", target_feature = "neon"));
 
     doubles_one_by_one!();
 

@@ -1,0 +1,188 @@
+//! A line and a triangle in real arithmetic, for processors of 32 bits: what [`triangle`](super::triangle) does, in a fraction
+//! of its code and stack. Numbers have no units here, but one fixed point, and are computed when they are asked for.
+//!
+//! With `ring(x; p, q, r) = x . (p x q + q x r + r x p)`, all that is asked is a sum of rings: the normal of a triangle
+//! is what is in brackets, and `(p - o) x (q - o) = p x q + q x o + o x p`.
+
+use core::cmp::Ordering;
+
+use super::{Line, Triangle, sphere, triangle};
+use crate::math::binary::Binary;
+use crate::math::fixed::{Fixed, Product};
+use crate::math::rounding::UNIT;
+
+/// Adds `x . (p x q)`, or subtracts it.
+#[inline(never)]
+fn add_volume(sum: &mut Fixed, [x, p, q]: [&[f32; 3]; 3], minus: bool) {
+    for k in 0..3 {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        sum.add_product([x[k], p[i], q[j]], minus);
+        sum.add_product([x[k], p[j], q[i]], !minus);
+    }
+}
+
+/// Adds a ring, or subtracts it.
+#[inline(never)]
+fn add_ring(sum: &mut Fixed, x: &[f32; 3], [p, q, r]: [&[f32; 3]; 3], minus: bool) {
+    add_volume(sum, [x, p, q], minus);
+    add_volume(sum, [x, q, r], minus);
+    add_volume(sum, [x, r, p], minus);
+}
+
+fn ring(x: &[f32; 3], corners: [&[f32; 3]; 3]) -> Fixed {
+    let mut sum = Fixed::ZERO;
+    add_ring(&mut sum, x, corners, false);
+    sum
+}
+
+/// See [`triangle::volumes`]: exact in sign, and in size within `1.001 UNIT`.
+#[inline(never)]
+pub(crate) fn volumes(line: &Line, [a, b, c]: Triangle) -> [f64; 3] {
+    let mut volumes = [0.0; 3];
+    for (volume, [p, q]) in volumes.iter_mut().zip([[&c, &a], [&a, &b], [&b, &c]]) {
+        *volume = ring(&line.direction, [p, q, &line.origin]).approximate();
+    }
+    volumes
+}
+
+/// See [`triangle::normal`]: each component within `1.001 UNIT` of the real one.
+pub(crate) fn normal([a, b, c]: Triangle) -> [f64; 3] {
+    let mut normal = [0.0; 3];
+    for (k, component) in normal.iter_mut().enumerate() {
+        let mut axis = [0.0; 3];
+        axis[k] = 1.0;
+        *component = ring(&axis, [&a, &b, &c]).approximate();
+    }
+    normal
+}
+
+/// Whether the triangle has area.
+#[inline(never)]
+pub(crate) fn has_area(triangle: Triangle) -> bool {
+    normal(triangle).iter().any(|x| *x != 0.0)
+}
+
+/// The `t` at which a line meets a plane, or a float.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Quotient {
+    Of(Line, Triangle),
+    Float(Binary),
+}
+
+impl Quotient {
+    /// The `t` at which the line meets the plane of a triangle; `None` when it is parallel to it.
+    pub fn new(line: &Line, triangle: Triangle) -> Option<Self> {
+        let [a, b, c] = &triangle;
+        let is_parallel = ring(&line.direction, [a, b, c]).sign() == Ordering::Equal;
+        (!is_parallel).then_some(Quotient::Of(*line, triangle))
+    }
+
+    /// A float, or the middle of two.
+    pub(super) fn float(x: Binary) -> Self {
+        Quotient::Float(x)
+    }
+
+    /// The same number as one of the large quotients.
+    fn long(&self) -> triangle::Quotient {
+        match *self {
+            // It exists: this was made only if the line is not parallel.
+            Quotient::Of(ref line, triangle) => triangle::Quotient::new(line, triangle)
+                .unwrap_or_else(|| triangle::Quotient::float(Binary::of(0.0))),
+            Quotient::Float(x) => triangle::Quotient::float(x),
+        }
+    }
+
+    /// `(a - origin) . n`.
+    #[inline(never)]
+    fn dividend(&self) -> Fixed {
+        match self {
+            Quotient::Float(x) => Fixed::of(*x),
+            Quotient::Of(line, [a, b, c]) => {
+                let mut sum = Fixed::ZERO;
+                add_volume(&mut sum, [a, b, c], false);
+                add_ring(&mut sum, &line.origin, [a, b, c], true);
+                sum
+            }
+        }
+    }
+
+    /// `direction . n`.
+    #[inline(never)]
+    fn divisor(&self) -> Fixed {
+        match self {
+            Quotient::Float(_) => Fixed::of(Binary { mantissa: 1, exponent: 0 }),
+            Quotient::Of(line, [a, b, c]) => ring(&line.direction, [a, b, c]),
+        }
+    }
+
+    /// The quotient in `f64`, and a bound on its error.
+    ///
+    /// Dividend and divisor are off by `1.001 UNIT` each, and their quotient is rounded: below
+    /// `3.01 UNIT`. Both are between 2^-447 and 2^392 in size, far from the ends of `f64`.
+    pub fn approximate(&self) -> (f64, f64) {
+        let t = self.dividend().approximate() / self.divisor().approximate();
+        (t, 4.0 * UNIT * t.abs())
+    }
+
+    /// The order of two of them, on one line or on different ones: `N / D` and `N' / D'` are in the order of `N D'` and
+    /// `N' D`, of sixth degree, or in the other one if `D` and `D'` are of different signs.
+    #[inline(never)]
+    pub fn compare(&self, other: &Quotient) -> Ordering {
+        let mut difference = Product::ZERO;
+        let [n, e] = self.add_sizes(other, &mut difference);
+        // With all bits flipped, `-1 - x` becomes `-1 - x + y`, and then `x - y`.
+        difference.flip();
+        let [m, d] = other.add_sizes(self, &mut difference);
+        difference.flip();
+        let order = (n * e).cmp(&(m * d)).then_with(|| match n * e {
+            0.. => difference.sign(),
+            _ => difference.sign().reverse(),
+        });
+        if d == e { order } else { order.reverse() }
+    }
+
+    /// Adds the product of the sizes of the own dividend and the other's divisor, and says what their signs are.
+    #[inline(never)]
+    fn add_sizes(&self, other: &Quotient, product: &mut Product) -> [i32; 2] {
+        let (mut dividend, mut divisor) = (self.dividend(), other.divisor());
+        let signs = [dividend.take_sign() as i32, divisor.take_sign() as i32];
+        product.add(&dividend, &divisor);
+        signs
+    }
+}
+
+/// The `t` at which a line enters a sphere or leaves it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Root {
+    line: Line,
+    centre: [f32; 3],
+    radius: f32,
+    root: usize,
+}
+
+impl Root {
+    /// `None` when the line misses the sphere.
+    pub fn new(line: &Line, centre: [f32; 3], radius: f32, root: usize) -> Option<Self> {
+        sphere::Root::new(line, centre, radius, root)?;
+        Some(Root { line: *line, centre, radius, root })
+    }
+
+    pub fn approximate(&self) -> (f64, f64) {
+        self.long().map_or((0.0, 0.0), |t| t.approximate())
+    }
+
+    /// See [`sphere::Root::compare_with`].
+    pub fn compare_with(&self, x: &Quotient) -> Ordering {
+        self.long().map_or(Ordering::Equal, |t| t.compare_with(&x.long()))
+    }
+
+    /// The order of two roots, on one line or on different ones.
+    pub fn compare(&self, other: &Root) -> Ordering {
+        self.long().zip(other.long()).map_or(Ordering::Equal, |(p, q)| p.compare(&q))
+    }
+
+    /// The same number with its polynomial; it exists, as for [`Quotient::long`].
+    fn long(&self) -> Option<sphere::Root> {
+        sphere::Root::new(&self.line, self.centre, self.radius, self.root)
+    }
+}
