@@ -10,7 +10,7 @@ use crate::kinds::{GRID, WIDE};
 use crate::math::Bits;
 use crate::prim::Leaves;
 use crate::query::{
-    Any, Choice, Closest, Decide, Either, Exact, ExactMet, Filter, Locate, Meets, Query,
+    Any, Choice, Closest, Decide, Either, Erased, Exact, ExactMet, Filter, Locate, Meets, Query,
     SureMeetings, Wanted, Watch, geometry_of,
 };
 use crate::ray::{Abreast, FrameSlab, Hit, Interval, Late, NONE, PreparedRay, Ray, Slab};
@@ -20,7 +20,7 @@ use crate::simd::{self, Kernel, SMALL, Scalar, Simd};
 pub(crate) trait Question<'m> {
     type Query: Query;
     type Answer;
-    /// Whether it need not be fast, which saves its code for every backend.
+    /// Whether it need not be fast: then it is asked as odd rays ask, which saves its code for every backend.
     const RARE: bool = false;
 
     /// The query, of which nothing beyond this `t` of the frame is asked.
@@ -394,11 +394,10 @@ impl<'m> Question<'m> for ClosestMet {
 /// The answer to `question` for one ray, without what is in instances.
 #[inline(always)]
 pub(crate) fn ask<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
-    if SMALL {
+    if SMALL || Q::RARE {
         return ask_any(block, ray, question);
     }
-    let ask = Ask { block, ray, question };
-    if Q::RARE { ask.run(Scalar) } else { simd::dispatch(ask) }
+    simd::dispatch(Ask { block, ray, question })
 }
 
 /// One ray, waiting for a backend.
@@ -427,8 +426,8 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
     }
 }
 
-/// For any ray: for those at the ends of the floats, which are so rare that portable code will do, and for all where code
-/// shall be small.
+/// For any ray: for those at the ends of the floats, which are so rare that portable code will do, behind pointers; for
+/// questions that are rare; and for all where code shall be small.
 #[cold]
 #[inline(never)]
 fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
@@ -437,8 +436,24 @@ fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> 
     let Some(mut ray) = ray.prepare_any(reach) else { return Q::nothing() };
     let mut query = question.query(block, ray.t_max);
     let slab = FrameSlab::new(&ray, reach);
-    let ended = trace(Scalar, block, &mut ray, &slab, &mut query);
+    // Those who add up stacks do not see through pointers.
+    let ended = match Q::Query::ORDERED {
+        _ if SMALL => trace(Scalar, block, &mut ray, &slab, &mut query),
+        true => trace_any(block, &mut ray, &slab, Erased::<true>(&mut query)),
+        false => trace_any(block, &mut ray, &slab, Erased::<false>(&mut query)),
+    };
     Q::answer(block, &ray, &mut query, ended)
+}
+
+/// [`trace`] for queries of any type.
+#[inline(never)]
+fn trace_any<const ORDERED: bool>(
+    block: &Block,
+    ray: &mut PreparedRay,
+    slab: &FrameSlab,
+    mut query: Erased<ORDERED>,
+) -> bool {
+    trace(Scalar, block, ray, slab, &mut query)
 }
 
 /// The record of the meeting that won.

@@ -7,9 +7,9 @@ use crate::block::cells::{
 };
 use crate::math::rounding::{f32_above, f32_below};
 use crate::prim::Leaves;
-use crate::query::{Query, Watch};
+use crate::query::{Erased, Query, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
-use crate::simd::{Scalar, Simd, Width};
+use crate::simd::{SMALL, Scalar, Simd, Width};
 
 /// The parts of a block that a walk reads.
 #[derive(Clone, Copy)]
@@ -99,7 +99,18 @@ fn bound_of<S: Simd>(s: S, t_bound: f32, start: f64) -> <S as Width<4>>::V {
 #[cold]
 #[inline(never)]
 fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool {
-    cells.leaves.intersect_all(Scalar, ray, &WideSlab::new(ray), query)
+    let (leaves, slab) = (&cells.leaves, &WideSlab::new(ray));
+    if SMALL || Q::OF_INDEX {
+        leaves.intersect_all(Scalar, ray, slab, query)
+    } else {
+        all_of(leaves, ray, slab, Erased(query))
+    }
+}
+
+/// The same for queries of any type.
+#[inline(never)]
+fn all_of(leaves: &Leaves, ray: &PreparedRay, slab: &WideSlab, mut query: Erased<true>) -> bool {
+    leaves.intersect_all(Scalar, ray, slab, &mut query)
 }
 
 /// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search. Times are counted from `start`.

@@ -5,12 +5,14 @@
 //! is a [`Query`]: [`Closest`], [`Any`] or [`Locate`], which go with each precision, or [`NextHits`], which is exact.
 
 mod ask;
+mod erased;
 mod exact;
 mod hits;
 mod options;
 mod watertight;
 
 pub(crate) use ask::{Any, Closest, Either, Locate, Wanted};
+pub(crate) use erased::Erased;
 pub(crate) use exact::{Exact, ExactMet, SureMeetings};
 pub(crate) use hits::NextHits;
 pub(crate) use options::shares_bit;
