@@ -324,6 +324,18 @@ pub(crate) fn ask<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question:
     if Q::RARE { ask.run(Scalar) } else { simd::dispatch(ask) }
 }
 
+/// The same by a backend that is chosen already.
+#[inline(always)]
+pub(crate) fn ask_by<'m, S: Simd, Q: Question<'m>>(
+    s: S,
+    block: Finished<'m>,
+    ray: &Ray,
+    question: Q,
+) -> Q::Answer {
+    let ask = Ask { block, ray, question };
+    if Q::RARE { ask.run(Scalar) } else { s.run(ask) }
+}
+
 /// One ray, waiting for a backend.
 struct Ask<'a, 'm, Q> {
     block: Finished<'m>,
