@@ -15,6 +15,7 @@ mod options;
 mod ours;
 #[cfg(feature = "peers")]
 mod peers;
+mod points;
 mod ratios;
 mod rays;
 mod report;
@@ -35,6 +36,9 @@ fn main() -> Result<()> {
     }
     if options.motion {
         return motion::run(&options);
+    }
+    if options.points {
+        return points::run(&options);
     }
     let mut watch = Watch::new();
     if !watch.counts_events() {
