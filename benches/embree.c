@@ -193,6 +193,74 @@ void bench_embree_closest(BenchEmbree *e, const BenchRay *rays, BenchHit *hits, 
     _mm_setcsr(before);
 }
 
+/* A triangle scene as a point query sees it, and what was found. */
+typedef struct {
+    RTCScene scene;
+    unsigned prim, geometry;
+} PointSearch;
+
+typedef struct { float x, y, z; } Vec;
+
+static Vec from_to(Vec a, Vec b) { return (Vec){b.x - a.x, b.y - a.y, b.z - a.z}; }
+static float dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+static Vec along(Vec a, float t, Vec d) { return (Vec){a.x + t * d.x, a.y + t * d.y, a.z + t * d.z}; }
+
+/* By which corner, edge or face is closest: Ericson, Real-Time Collision Detection, 5.1.5, as in Embree's tutorial. */
+static Vec closest_on_triangle(Vec p, Vec a, Vec b, Vec c)
+{
+    Vec ab = from_to(a, b), ac = from_to(a, c), ap = from_to(a, p);
+    float d1 = dot(ab, ap), d2 = dot(ac, ap);
+    if (d1 <= 0 && d2 <= 0) return a;
+    Vec bp = from_to(b, p);
+    float d3 = dot(ab, bp), d4 = dot(ac, bp);
+    if (d3 >= 0 && d4 <= d3) return b;
+    Vec cp = from_to(c, p);
+    float d5 = dot(ab, cp), d6 = dot(ac, cp);
+    if (d6 >= 0 && d5 <= d6) return c;
+    float vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return along(a, d1 / (d1 - d3), ab);
+    float vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return along(a, d2 / (d2 - d6), ac);
+    float va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 >= d3 && d5 >= d6)
+        return along(b, (d4 - d3) / (d4 - d3 + (d5 - d6)), from_to(b, c));
+    float sum = va + vb + vc;
+    return along(along(a, vb / sum, ab), vc / sum, ac);
+}
+
+static bool consider(struct RTCPointQueryFunctionArguments *args)
+{
+    PointSearch *search = args->userPtr;
+    RTCGeometry mesh = rtcGetGeometry(search->scene, args->geomID);
+    const Vec *vertices = rtcGetGeometryBufferData(mesh, RTC_BUFFER_TYPE_VERTEX, 0);
+    const uint32_t *corner = rtcGetGeometryBufferData(mesh, RTC_BUFFER_TYPE_INDEX, 0);
+    corner += 3 * (size_t)args->primID;
+    Vec p = {args->query->x, args->query->y, args->query->z};
+    Vec a = vertices[corner[0]], b = vertices[corner[1]], c = vertices[corner[2]];
+    Vec away = from_to(p, closest_on_triangle(p, a, b, c));
+    float distance = sqrtf(dot(away, away));
+    if (!(distance < args->query->radius)) return false;
+    args->query->radius = distance;
+    search->prim = args->primID;
+    search->geometry = args->geomID;
+    return true;
+}
+
+void bench_embree_points(BenchEmbree *e, const float *points, BenchHit *found, size_t count)
+{
+    unsigned before = enter();
+    for (size_t i = 0; i < count; i++) {
+        const float *p = points + 3 * i;
+        struct RTCPointQuery query = {p[0], p[1], p[2], 0, INFINITY};
+        struct RTCPointQueryContext context;
+        rtcInitPointQueryContext(&context);
+        PointSearch search = {e->scene, ~0u, RTC_INVALID_GEOMETRY_ID};
+        rtcPointQuery(e->scene, &query, &context, consider, &search);
+        found[i] = hit(query.radius, 0, 0, search.prim, search.geometry, ~0u);
+    }
+    _mm_setcsr(before);
+}
+
 void bench_embree_any(BenchEmbree *e, const BenchRay *rays, uint8_t *occluded, size_t count)
 {
     unsigned before = enter();

@@ -44,6 +44,9 @@ void bench_embree_free(BenchEmbree *);
 void bench_embree_closest(BenchEmbree *, const BenchRay *, BenchHit *, size_t count);
 void bench_embree_any(BenchEmbree *, const BenchRay *, uint8_t *occluded, size_t count);
 
+/* The closest triangle of each point by rtcPointQuery: its distance is the `t` of a hit. */
+void bench_embree_points(BenchEmbree *, const float *points, BenchHit *, size_t count);
+
 /* Many rays in Embree's own layout. `width` is 8 or 16 for packets, 1 for a stream. */
 BenchBatch *bench_batch_new(const BenchRay *, size_t count, int width, int any);
 void bench_batch_run(BenchEmbree *, BenchBatch *, int coherent);

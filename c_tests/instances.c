@@ -1,11 +1,13 @@
-// Instances from C: hits, masks, skip, surface, every structure over every other, a rebuild of the top, and packing.
+// Instances from C: hits, batches, masks, skip, surface, every structure over every other, a rebuild of the top, and packing.
 
 #include "check.h"
 
 #define SIZE 12
 #define COUNT 9
 
-static RtHit hits[2000];
+#define RAYS 2000
+
+static RtHit hits[RAYS];
 
 // Instance `i` of a sheet, turned, mirrored and stretched.
 static RtInstance placed(const RtAccel *child, uint32_t i) {
@@ -18,6 +20,18 @@ static RtRay ray_at(uint32_t i) {
     RtRay ray = ray_over(40, i);
     ray.origin[2] *= 8.0f;
     return ray;
+}
+
+// Batches give the bits of single calls.
+static void ask_together(const RtAccel *top) {
+    static RtRay rays[RAYS];
+    static RtHit together[RAYS];
+    static uint8_t occluded[RAYS];
+    for (uint32_t i = 0; i < RAYS; i++) rays[i] = ray_at(i);
+    rt_intersect_batch(top, rays, together, RAYS);
+    rt_occluded_batch(top, rays, occluded, RAYS);
+    CHECK(memcmp(together, hits, sizeof hits) == 0);
+    for (uint32_t i = 0; i < RAYS; i++) CHECK(occluded[i] == (hits[i].prim != RT_NONE));
 }
 
 int main(void) {
@@ -44,7 +58,7 @@ int main(void) {
         memset(&info, 0, sizeof info);
         info.struct_size = sizeof info;
         CHECK(rt_accel_info(top, &info) == RT_OK && info.instance_count == COUNT);
-        for (uint32_t i = 0; i < 2000; i++) {
+        for (uint32_t i = 0; i < RAYS; i++) {
             RtRay ray = ray_at(i);
             RtHit hit;
             bool found = rt_intersect(top, &ray, &hit);
@@ -73,8 +87,9 @@ int main(void) {
             if (rt_intersect_with(top, &ray, &query, &other)) CHECK(other.t >= hit.t);
             CHECK(memcmp(&other, &hit, sizeof hit) != 0);
         }
+        ask_together(top);
     }
-    CHECK(met > 2000);
+    CHECK(met > RAYS);
 
     // Masks, and the top level once more in the same memory.
     for (uint32_t i = 0; i < COUNT; i++) instances[i].mask = 1u << i;
@@ -86,7 +101,7 @@ int main(void) {
     memset(&query, 0, sizeof query);
     query.struct_size = sizeof query;
     query.mask = 1 << 4;
-    for (uint32_t i = 0; i < 2000; i++) {
+    for (uint32_t i = 0; i < RAYS; i++) {
         RtRay ray = ray_at(i);
         RtHit hit;
         if (rt_intersect_with(top, &ray, &query, &hit))
@@ -104,11 +119,12 @@ int main(void) {
     memcpy(copy, packed, need.size);
     memset(packed, 0, need.size);
     CHECK(rt_accel_open(copy, need.size, &opened) == RT_OK);
-    for (uint32_t i = 0; i < 2000; i++) {
+    for (uint32_t i = 0; i < RAYS; i++) {
         RtRay ray = ray_at(i);
         RtHit hit;
         rt_intersect(opened, &ray, &hit);
         CHECK(memcmp(&hit, &hits[i], sizeof hit) == 0);
     }
+    ask_together(opened);
     return 0;
 }

@@ -400,6 +400,20 @@ pub(crate) fn ask<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question:
     simd::dispatch(Ask { block, ray, question })
 }
 
+/// The same by a backend that is chosen already.
+#[inline(always)]
+pub(crate) fn ask_by<'m, S: Simd, Q: Question<'m>>(
+    s: S,
+    block: Finished<'m>,
+    ray: &Ray,
+    question: Q,
+) -> Q::Answer {
+    if SMALL || Q::RARE {
+        return ask_any(block, ray, question);
+    }
+    s.run(Ask { block, ray, question })
+}
+
 /// One ray, waiting for a backend.
 struct Ask<'a, 'm, Q> {
     block: Finished<'m>,

@@ -64,7 +64,7 @@ fn a_field_of_instances() {
     let rays = [
         camera(64, [0.5, 8.0, 30.0], [0.0; 3], 12.0),
         camera(64, [1.5, 3.0, 9.0], [0.2, 0.1, 0.2], 1.0),
-        camera(64, [0.2, 12.0, 0.3], [0.0; 3], 0.02),
+        camera(64, [0.9, 12.0, 1.3], [0.85, 0.0, 0.85], 0.02),
         odd,
     ];
     for own in [Model::default(), plane] {
@@ -93,7 +93,7 @@ fn instances_of_a_large_child() {
         let scene = Scene::new(&[], &[]).with_instances(&instances);
         let top = OwnedAccel::bvh(&scene, &BuildOptions::default()).expect("a BVH");
         let accel = top.accel();
-        let rays = camera(64, [0.5, 12.0, 30.0], [0.0; 3], 10.0);
+        let rays = camera(64, [0.5, 12.0, 30.0], [0.0; 3], 4.0);
         let hits: Vec<_> = rays.iter().map(|ray| accel.intersect(ray)).collect();
         let mut random = Random::new(5);
         let onwards = rays.iter().zip(&hits).filter_map(|(ray, hit)| {

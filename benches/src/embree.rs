@@ -9,6 +9,7 @@ use raykern_harness::model::Model;
 use crate::lineup::{Class, Lineup, Tracer};
 use crate::motion::Follower;
 use crate::options::Options;
+use crate::points::Finder;
 use crate::watch::{Watch, timed_build};
 
 /// An opaque `BenchEmbree`.
@@ -38,6 +39,7 @@ unsafe extern "C" {
     fn bench_embree_free(scene: *mut RawScene);
     fn bench_embree_closest(scene: *mut RawScene, rays: *const Ray, hits: *mut Hit, count: usize);
     fn bench_embree_any(scene: *mut RawScene, rays: *const Ray, occluded: *mut u8, count: usize);
+    fn bench_embree_points(scene: *mut RawScene, points: *const f32, found: *mut Hit, count: usize);
     fn bench_batch_new(rays: *const Ray, count: usize, width: c_int, any: c_int) -> *mut RawBatch;
     fn bench_batch_run(scene: *mut RawScene, batch: *mut RawBatch, coherent: c_int);
     fn bench_batch_hits(batch: *const RawBatch, hits: *mut Hit);
@@ -208,6 +210,27 @@ pub fn followers(model: &Model, options: &Options) -> Vec<(String, Box<dyn Follo
         }
     }
     followers
+}
+
+/// The closest point by Embree, whose caller computes the distance to each triangle.
+pub fn finders(model: &Model, options: &Options) -> Vec<(String, Box<dyn Finder>)> {
+    let mut finders: Vec<(String, Box<dyn Finder>)> = Vec::new();
+    for (suffix, config) in DEVICES {
+        let name = format!("embree{suffix}");
+        let scene = Scene::new(model, SETUPS[0].on(config)).filter(|scene| !scene.commit());
+        let scene = scene.filter(|_| options.wants_peer(&name));
+        finders.extend(scene.map(|scene| (name, Box::new(scene) as Box<dyn Finder>)));
+    }
+    finders
+}
+
+impl Finder for Scene {
+    fn find(&self, points: &[[f32; 3]], found: &mut [Hit]) {
+        let count = points.len().min(found.len());
+        let numbers = points.as_flattened().as_ptr();
+        // SAFETY: both slices have that many elements.
+        unsafe { bench_embree_points(self.0, numbers, found.as_mut_ptr(), count) };
+    }
 }
 
 impl Follower for Scene {

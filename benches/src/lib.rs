@@ -14,6 +14,7 @@ pub mod options;
 pub mod ours;
 #[cfg(feature = "peers")]
 pub mod peers;
+pub mod points;
 pub mod ratios;
 pub mod rays;
 pub mod report;

@@ -8,7 +8,7 @@ use clap::Parser;
 
 use raykern_bench::options::Options;
 use raykern_bench::watch::Watch;
-use raykern_bench::{instances, measure, motion, ratios, report, scenes, watch};
+use raykern_bench::{instances, measure, motion, points, ratios, report, scenes, watch};
 
 fn main() -> Result<()> {
     let options = Options::parse();
@@ -18,6 +18,9 @@ fn main() -> Result<()> {
     }
     if options.motion {
         return motion::run(&options);
+    }
+    if options.points {
+        return points::run(&options);
     }
     let mut watch = Watch::new();
     if !watch.counts_events() {

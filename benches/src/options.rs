@@ -47,6 +47,9 @@ pub struct Options {
     /// Instead of still scenes: one model many times, by instances.
     #[arg(long)]
     pub instances: bool,
+    /// Instead of rays: the closest point of a scene, for many points.
+    #[arg(long)]
+    pub points: bool,
     /// The folder of scene files; else RAYKERN_SCENES, else shared/scenes beside the workspace.
     #[arg(long, value_name = "DIR")]
     pub folder: Option<PathBuf>,

@@ -5,17 +5,23 @@
 //! back for each instance. Answers of different instances are compared by their rounded `t`; where these are equal, in
 //! real arithmetic.
 
+mod manner;
 mod reach;
 mod stops;
+mod through;
 mod together;
 
 use core::cmp::Ordering;
+use core::marker::PhantomData;
 
 use crate::block::Finished;
 use crate::block::level::{InstanceRecord, Level};
 use crate::query::{Choice, Counts, Decide, Exact, QueryOptions, Watch, Watertight, shares_bit};
 use crate::ray::{Hit, NONE, Ray};
-use crate::trace::{ClosestMet, any_hit, ask, closest_hit};
+use crate::simd::Simd;
+use crate::trace::{AnyHit, ClosestHit, ClosestMet, MEMORY, ask, ask_by};
+
+use through::{Search, visit, visit_by};
 
 pub(crate) use reach::visit_reached;
 pub(crate) use together::{any_of_each, closest_of_each};
@@ -26,39 +32,18 @@ pub(crate) fn closest<D: Across, W: Watch>(
     block: Finished,
     ray: &Ray,
     options: &QueryOptions,
-    mut watch: W,
+    watch: W,
 ) -> Option<Hit> {
-    let level = block.level()?;
-    let mut ask_in = |place: &Shown, ray: &Ray| {
-        if place.is_empty() {
-            return None;
-        }
-        let choice = place.choice(options);
-        let hit = closest_hit::<D, _>(place.block, ray, choice, watch.lend())?;
-        Some(Hit { instance: place.instance, ..hit })
-    };
-    let own = Shown::own(block);
-    let mut best = ask_in(&own, ray).map(|hit| Best { hit, shown: own, ray: *ray });
-    let limited = |best: &Option<Best>| Ray {
-        t_max: best.as_ref().map_or(ray.t_max, |best| best.limit(ray)),
-        ..*ray
-    };
-    let (start, mut steps) = (limited(&best), Counts::default());
-    let counts = W::COUNTS.then_some(&mut steps);
-    visit_reached(&level, &start, counts, &mut |number| {
-        let found = Shown::of(&level, number, options).and_then(|(shown, record)| {
-            let ray = record.object_ray(&limited(&best))?;
-            ask_in(&shown, &ray).map(|hit| Best { hit, shown, ray })
-        });
-        if let Some(found) = found
-            && best.as_ref().is_none_or(|best| found.is_before::<D>(best, options))
-        {
-            best = Some(found);
-        }
-        Some(limited(&best).t_max)
-    });
-    watch.steps(steps.steps);
-    best.map(|best| best.hit)
+    let level = &block.level()?;
+    let decide = PhantomData::<D>;
+    let mut search = ClosestSearch { block, level, options, ray: *ray, best: None, watch, decide };
+    if !Shown::own(block).is_empty() {
+        visit(&mut search, NONE);
+    }
+    let (start, mut counts) = (search.ray, Counts::default());
+    visit_by::<W>(level, &start, &mut search, &mut counts);
+    search.watch.steps(counts.steps);
+    search.best.map(|best| best.hit)
 }
 
 /// Whether anything that `options` leave is hit in a block with instances.
@@ -67,28 +52,82 @@ pub(crate) fn any<D: Decide, W: Watch>(
     block: Finished,
     ray: &Ray,
     options: &QueryOptions,
-    mut watch: W,
+    watch: W,
 ) -> bool {
-    let Some(level) = block.level() else { return false };
-    let mut is_hit_in = |place: &Shown, ray: &Ray| {
-        let choice = place.choice(options);
-        !place.is_empty() && any_hit::<D, _>(place.block, ray, choice, watch.lend())
-    };
-    if is_hit_in(&Shown::own(block), ray) {
-        return true;
+    let Some(level) = &block.level() else { return false };
+    let decide = PhantomData::<D>;
+    let mut search = AnySearch { block, level, options, ray, hit: false, watch, decide };
+    if !Shown::own(block).is_empty() {
+        visit(&mut search, NONE);
     }
-    let (mut hit, mut steps) = (false, Counts::default());
-    let counts = W::COUNTS.then_some(&mut steps);
-    visit_reached(&level, ray, counts, &mut |number| {
-        hit = Shown::of(&level, number, options).is_some_and(|(shown, record)| {
-            record.object_ray(ray).is_some_and(|ray| is_hit_in(&shown, &ray))
-        });
-        (!hit).then_some(ray.t_max)
-    });
-    watch.steps(steps.steps);
-    hit
+    if !search.hit {
+        let mut counts = Counts::default();
+        visit_by::<W>(level, ray, &mut search, &mut counts);
+        search.watch.steps(counts.steps);
+    }
+    search.hit
 }
 
+/// The search for the closest hit.
+struct ClosestSearch<'a, 'm, D, W> {
+    block: Finished<'m>,
+    level: &'a Level<'m>,
+    options: &'a QueryOptions,
+    /// Up to the best hit so far.
+    ray: Ray,
+    best: Option<Best<'m>>,
+    watch: W,
+    decide: PhantomData<D>,
+}
+
+impl<D: Across, W: Watch> Search for ClosestSearch<'_, '_, D, W> {
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, s: S, instance: u32) -> Option<f32> {
+        let place = Shown::at(self.block, self.level, instance, self.options, &self.ray);
+        if let Some((shown, ray)) = place {
+            let question =
+                ClosestHit::<D, _, MEMORY>::new(shown.choice(self.options), self.watch.lend());
+            if let Some(hit) = ask_by(s, shown.block, &ray, question) {
+                self.take(Best { hit: Hit { instance, ..hit }, shown, ray });
+            }
+        }
+        Some(self.ray.t_max)
+    }
+}
+
+impl<'m, D: Across, W> ClosestSearch<'_, 'm, D, W> {
+    fn take(&mut self, found: Best<'m>) {
+        if self.best.as_ref().is_none_or(|best| found.is_before::<D>(best, self.options)) {
+            // Not below the real `t`, which the hit's is rounded from.
+            self.ray.t_max = found.hit.t.next_up().min(self.ray.t_max);
+            self.best = Some(found);
+        }
+    }
+}
+
+/// The search for any hit.
+struct AnySearch<'a, 'm, D, W> {
+    block: Finished<'m>,
+    level: &'a Level<'m>,
+    options: &'a QueryOptions,
+    ray: &'a Ray,
+    hit: bool,
+    watch: W,
+    decide: PhantomData<D>,
+}
+
+impl<D: Decide, W: Watch> Search for AnySearch<'_, '_, D, W> {
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, s: S, instance: u32) -> Option<f32> {
+        if let Some((shown, ray)) =
+            Shown::at(self.block, self.level, instance, self.options, self.ray)
+        {
+            let question = AnyHit::<D, _>::new(shown.choice(self.options), self.watch.lend());
+            self.hit = ask_by(s, shown.block, &ray, question);
+        }
+        (!self.hit).then_some(self.ray.t_max)
+    }
+}
 /// The block of an instance, or the one that has instances.
 #[derive(Clone, Copy)]
 pub(crate) struct Shown<'m> {
@@ -115,6 +154,24 @@ impl<'m> Shown<'m> {
         Some((Shown { block, instance }, record))
     }
 
+    /// That of an instance, or of none, if `options` leave something of it, and the ray in its space.
+    #[inline(always)]
+    fn at(
+        block: Finished<'m>,
+        level: &Level<'m>,
+        instance: u32,
+        options: &QueryOptions,
+        ray: &Ray,
+    ) -> Option<(Self, Ray)> {
+        let (shown, ray) = if instance == NONE {
+            (Shown::own(block), *ray)
+        } else {
+            let (shown, record) = Shown::of(level, instance, options)?;
+            (shown, record.object_ray(ray)?)
+        };
+        (!shown.is_empty()).then_some((shown, ray))
+    }
+
     /// Whether it has no primitives of its own.
     fn is_empty(&self) -> bool {
         self.block.header().counts.prim_ids == 0
@@ -136,11 +193,6 @@ pub(crate) struct Best<'m> {
 }
 
 impl Best<'_> {
-    /// A limit that is not below the real `t`, which the hit's is rounded from.
-    fn limit(&self, ray: &Ray) -> f32 {
-        self.hit.t.next_up().min(ray.t_max)
-    }
-
     /// Whether this comes first: at a smaller `t`, or at an equal one in an instance of a smaller number.
     fn is_before<D: Across>(&self, other: &Best, options: &QueryOptions) -> bool {
         match self.hit.t.partial_cmp(&other.hit.t) {

@@ -1,7 +1,8 @@
 //! Which instances a ray comes to, by the index over them.
 
+use crate::block::bundle::ChildRef;
 use crate::block::level::Level;
-use crate::block::{Bundles, KIND_BVH};
+use crate::block::{Block, Bundles, KIND_BVH};
 use crate::math::rounding::f32_above;
 use crate::math::wide;
 use crate::query::{Counts, Query, SphereLane, TriangleLane, Watch};
@@ -44,6 +45,14 @@ pub(super) fn widening(level: &Level, ray: &Ray) -> f64 {
     let farthest = ray.origin.iter().fold(0.0f32, |farthest, x| farthest.max(x.abs()));
     let beyond = f64::from(farthest) - f64::from(level.head.calm);
     f64::from(level.head.spread) * beyond.max(0.0)
+}
+
+/// The instance that is a leaf of an index in bundles, where each has a leaf block of its own.
+#[inline(always)]
+pub(super) fn instance_of(index: &Block, leaf: ChildRef) -> Option<u32> {
+    let (_, number) = leaf.leaf_block();
+    let first = index.sphere_blocks.get(number)?.first;
+    index.prim_ids.get(first as usize).copied()
 }
 
 /// Calls `visit` for each instance whose box the ray comes to, one after the other: for rays at the ends of the floats, and
@@ -136,7 +145,7 @@ impl<W: Watch> Kernel for Reaching<'_, '_, '_, W> {
 const MAILBOX: usize = 32;
 
 /// The query that calls back for instances.
-struct Reach<'a, 'm, 'v, W> {
+pub(super) struct Reach<'a, 'm, 'v, W> {
     level: &'a Level<'m>,
     visit: &'a mut Visit<'v>,
     t_bound: f32,

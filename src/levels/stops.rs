@@ -3,13 +3,15 @@
 //! Rays that are alike go through the index as one, the others one by one. Nothing is asked of the instances yet, so no hit
 //! ends the search; what is found stays in order of distance, and whoever asks stops at the first that is too far.
 
-use super::reach::{visit_reached, widening};
+use core::mem;
+
+use super::reach::{instance_of, visit_reached, widening};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::level::Level;
 use crate::block::{Block, Bundles};
 use crate::math::Bits;
 use crate::math::rounding::f32_below;
-use crate::ray::{Alike, Ray, RayPacket, Slab, WideBoxes};
+use crate::ray::{Alike, NONE, Ray, RayPacket, Slab, WideBoxes};
 use crate::simd::{Kernel, Lanes, Simd, Width};
 
 /// So many rays are taken at a time.
@@ -30,15 +32,24 @@ pub(super) struct Stops {
 }
 
 impl Stops {
-    pub const NONE: Self =
-        Stops { near: [0.0; ROOM], instances: [0; ROOM], count: 0, next: 0, beyond: f32::INFINITY };
+    pub const NONE: Self = Stops {
+        near: [f32::INFINITY; ROOM],
+        instances: [NONE; ROOM],
+        count: 0,
+        next: 0,
+        beyond: f32::INFINITY,
+    };
 
     /// The next one that the ray enters before `limit`.
     pub fn next(&mut self, limit: f32) -> Option<u32> {
-        let instance = *self.instances[..self.count].get(self.next)?;
+        let near = *self.near.get(self.next).filter(|_| self.next < self.count)?;
         // What follows is no nearer.
-        self.next = if self.near[self.next] <= limit { self.next + 1 } else { self.count };
-        (self.near[self.next - 1] <= limit).then_some(instance)
+        if !(near <= limit) {
+            self.count = 0;
+            return None;
+        }
+        self.next += 1;
+        self.instances.get(self.next - 1).copied()
     }
 
     /// Whether there is none before `limit` for which there was no room.
@@ -47,27 +58,23 @@ impl Stops {
     }
 
     fn add(&mut self, instance: u32, near: f32) {
-        let mut place = self.count;
-        while place > 0 && near < self.near[place - 1] {
-            place -= 1;
-        }
-        if self.count == ROOM {
-            let last = if place == ROOM { near } else { self.near[ROOM - 1] };
-            self.beyond = if last < self.beyond { last } else { self.beyond };
-            if place == ROOM {
-                return;
+        let mut last = (near, instance);
+        for (near, instance) in self.near.iter_mut().zip(&mut self.instances).take(self.count) {
+            if last.0 < *near {
+                last = (mem::replace(near, last.0), mem::replace(instance, last.1));
             }
-            self.count -= 1;
         }
-        self.near.copy_within(place..self.count, place + 1);
-        self.instances.copy_within(place..self.count, place + 1);
-        (self.near[place], self.instances[place]) = (near, instance);
-        self.count += 1;
+        let places = (self.near.get_mut(self.count), self.instances.get_mut(self.count));
+        if let (Some(near), Some(instance)) = places {
+            (*near, *instance) = last;
+            self.count += 1;
+        } else if last.0 < self.beyond {
+            self.beyond = last.0;
+        }
     }
 }
 
-/// Rays on their way through the index, waiting for a backend. The answer is false if rays had better go one after the other
-/// there.
+/// Rays on their way through the index, waiting for a backend.
 pub(super) struct Gather<'a, 'm> {
     pub level: &'a Level<'m>,
     pub rays: &'a [Ray],
@@ -75,37 +82,28 @@ pub(super) struct Gather<'a, 'm> {
 }
 
 impl Kernel for Gather<'_, '_> {
-    type Output = bool;
+    type Output = ();
 
     #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> bool {
-        if !S::FLIES {
-            return false;
-        }
+    fn run<S: Simd>(self, s: S) {
         let Gather { level, rays, stops } = self;
         let index = &level.index.parts();
         let mut gatherer = Gatherer { level, index, found: Found::NONE };
         let mut first = 0;
         while first < rays.len() {
-            let rest = &rays[first..];
-            let alike = Alike::first_of(s, rest, index.header.reach);
-            let count = match alike {
-                Some((alike, count))
-                    if gatherer.together(s, alike, &rest[..count], &mut stops[first..]) =>
-                {
-                    count
-                }
-                _ => {
-                    let count = rest.len().min(16);
-                    for (ray, stops) in rest[..count].iter().zip(&mut stops[first..]) {
-                        gatherer.alone(s, ray, stops);
-                    }
-                    count
-                }
-            };
-            first += count;
+            let (rays, stops) = (&rays[first..], &mut stops[first..]);
+            let alike = Alike::first_of(s, rays, index.header.reach);
+            if let Some((alike, count)) = alike
+                && gatherer.together(s, alike, &rays[..count], stops)
+            {
+                first += count;
+                continue;
+            }
+            for (ray, stops) in rays.iter().zip(stops).take(16) {
+                gatherer.alone(s, ray, stops);
+            }
+            first += 16;
         }
-        true
     }
 }
 
@@ -127,7 +125,7 @@ impl Gatherer<'_, '_> {
             let t_scale = late.t_scale();
             for (leaf, near) in self.found.leaves() {
                 let near = f32_below(f64::from(near) / t_scale);
-                stops.add(self.instance(leaf), near);
+                stops.add(instance_of(self.index, leaf).unwrap_or(NONE), near);
             }
             return;
         }
@@ -148,11 +146,11 @@ impl Gatherer<'_, '_> {
         }
         let depth = alike.axes[2];
         for (leaf, near) in self.found.leaves() {
-            let instance = self.instance(leaf);
+            let Some(instance) = instance_of(self.index, leaf) else { continue };
             let Some(record) = self.level.instances.get(instance as usize) else { continue };
             let entered = packet.entered(s, &record.bounds);
-            for (group, entered) in entered.into_iter().enumerate() {
-                for lane in Bits(entered & sound[group]) {
+            for (group, (entered, sound)) in entered.into_iter().zip(sound).enumerate() {
+                for lane in Bits(entered & sound) {
                     let number = 16 * group + lane;
                     let (Some(ray), Some(stops)) = (rays.get(number), stops.get_mut(number)) else {
                         continue;
@@ -176,14 +174,6 @@ impl Gatherer<'_, '_> {
             Some(ray.t_max)
         });
     }
-
-    /// The instance that is a leaf of the index.
-    fn instance(&self, leaf: ChildRef) -> u32 {
-        let (_, number) = leaf.leaf_block();
-        let block = self.index.sphere_blocks.get(number);
-        let id = block.and_then(|block| self.index.prim_ids.get(block.first as usize));
-        id.copied().unwrap_or(u32::MAX)
-    }
 }
 
 /// So many leaves of the index are found at a time, and so many bundles to come back to remembered.
@@ -200,7 +190,7 @@ impl Found {
     const NONE: Self = Found { leaves: [ChildRef::NONE; MOST], near: [0.0; MOST], count: 0 };
 
     fn leaves(&self) -> impl Iterator<Item = (ChildRef, f32)> {
-        self.leaves[..self.count].iter().copied().zip(self.near)
+        self.leaves.into_iter().zip(self.near).take(self.count)
     }
 
     /// Becomes all leaves whose boxes are entered up to `t_bound`; false when there is no room.

@@ -4,25 +4,21 @@
 //! the same one together, up to the best hit so far, until none has anywhere to go. So everything that makes batches fast, rays
 //! that are alike traced as one and others while memory is waited for, works in instances as it does without.
 
+use core::{iter, mem, slice};
+
+use super::manner::manner_of;
 use super::stops::{CHUNK, Gather, Stops};
 use super::{Best, Shown, any, closest};
-use crate::batch::{self, Manner, Record};
+use crate::batch::{self, Record};
 use crate::block::Finished;
 use crate::block::level::{InstanceRecord, Level};
 use crate::query::{Choice, Exact, QueryOptions};
 use crate::ray::{Hit, NONE, Ray};
-use crate::simd;
+use crate::simd::{self, Kernel, Simd};
 use crate::trace::{AnyHit, ClosestHit, Together};
 
 /// So few rays are asked for one by one.
 const FEW: usize = 4;
-
-/// So many pairs of neighbours are looked at.
-const LOOKED_AT: usize = 12;
-/// Rays that pass this near each other, of the child's largest coordinate, meet much the same of it.
-const CLOSE: f32 = 1.0 / 700.0;
-/// Directions that differ less, of their largest component, are alike.
-const ALIKE: f32 = 1.0 / 8.0;
 
 /// The exact closest hit of each ray in a block with instances, [`Hit::MISS`] without one. Stops at the end of the shorter
 /// slice.
@@ -51,7 +47,7 @@ trait Asked {
     type Answer: Record<Self::Met> + Copy;
     type Question: for<'m> Together<'m, Answer = Self::Met>;
     const NOTHING: Self::Answer;
-    /// Neighbours that pass further from each other, of the child's largest coordinate, are no stream.
+    /// Neighbours that pass further from each other, of the child's size, are no stream.
     const FAR: f32;
 
     fn question(choice: Choice) -> Self::Question;
@@ -130,9 +126,26 @@ fn of_each<A: Asked>(
     answers: &mut [A::Answer],
 ) {
     let Some(level) = &block.level() else { return };
+    let (chunk, flies) = (Chunk { block, level, options }, simd::dispatch(Flies));
     for (rays, answers) in rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)) {
-        let count = rays.len().min(answers.len());
-        Chunk { block, level, options }.ask::<A>(&rays[..count], &mut answers[..count]);
+        if flies {
+            chunk.ask::<A>(rays, answers);
+        } else {
+            answers.fill(A::NOTHING);
+            chunk.ask_alone::<A>(rays, answers, |_| true);
+        }
+    }
+}
+
+/// Whether [batches](batch) are more than one ray after the other.
+struct Flies;
+
+impl Kernel for Flies {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, _: S) -> bool {
+        S::FLIES
     }
 }
 
@@ -144,111 +157,105 @@ struct Chunk<'a, 'm> {
 }
 
 impl<'m> Chunk<'_, 'm> {
-    /// Answers for up to [`CHUNK`] rays.
+    /// Answers for up to [`CHUNK`] rays, as many as both slices have.
+    ///
+    /// Out of line: it takes room on the stack that one ray after the other does not.
+    #[inline(never)]
     fn ask<A: Asked>(&self, rays: &[Ray], answers: &mut [A::Answer]) {
+        let count = rays.len().min(answers.len()).min(CHUNK);
+        let (rays, answers) = (&rays[..count], &mut answers[..count]);
         answers.fill(A::NOTHING);
         let own = Shown::own(self.block);
         if !own.is_empty() {
             batch::ask_all(own.block, rays, answers, A::question(own.choice(self.options)));
         }
-        let (mut limited, mut stops) = ([NO_RAY; CHUNK], [Stops::NONE; CHUNK]);
-        let limited = &mut limited[..rays.len()];
-        limited.copy_from_slice(rays);
-        set_limits::<A>(rays, answers, limited);
-        if !simd::dispatch(Gather { level: self.level, rays: limited, stops: &mut stops }) {
-            return self.ask_alone::<A>(rays, answers, |_, _| true);
+        let mut limited = [NO_RAY; CHUNK];
+        let limited = &mut limited[..count];
+        limit::<A>(rays, answers, limited);
+        let mut stops = [Stops::NONE; CHUNK];
+        simd::dispatch(Gather { level: self.level, rays: limited, stops: &mut stops });
+        let (mut turns, mut room) = ([NONE; CHUNK], Room::new::<A>());
+        while self.take_turns(limited, &mut stops, &mut turns) {
+            while self.visit::<A>(&mut turns, limited, &mut room, answers) {}
+            limit::<A>(rays, answers, limited);
         }
-        let (mut turns, mut room) = ([Turn::NONE; CHUNK], Room::new::<A>());
-        loop {
-            let count = self.take_turns::<A>(answers, limited, &mut stops, &mut turns);
-            if count == 0 {
-                break;
-            }
-            for turns in turns[..count].chunk_by(|a, b| self.go_together(a, b)) {
-                self.visit::<A>(turns, limited, &mut room, answers);
-            }
-            set_limits::<A>(rays, answers, limited);
+        for ((ray, answer), stops) in rays.iter().zip(answers).zip(&stops) {
+            self.ask_alone::<A>(slice::from_ref(ray), slice::from_mut(answer), |limit| {
+                !stops.are_all(limit)
+            });
         }
-        self.ask_alone::<A>(rays, answers, |i, limit| !stops[i].are_all(limit));
     }
 
-    /// Finds where each ray goes that has somewhere to go, by child and instance; returns how many these are.
-    fn take_turns<A: Asked>(
+    /// Finds the instance that each ray goes to next, [`NONE`] for those that have nowhere to go; whether any goes.
+    fn take_turns(
         &self,
-        answers: &[A::Answer],
         rays: &[Ray],
         stops: &mut [Stops; CHUNK],
-        turns: &mut [Turn; CHUNK],
-    ) -> usize {
-        let mut count = 0;
-        for (i, ((ray, answer), stops)) in rays.iter().zip(answers).zip(stops).enumerate() {
-            if A::limit(answer, ray).is_none() {
-                continue;
-            }
-            while let Some(instance) = stops.next(ray.t_max) {
-                if let Some((_, record)) = Shown::of(self.level, instance, self.options) {
-                    turns[count] = Turn { child: record.child, instance, ray: i as u32 };
-                    count += 1;
-                    break;
-                }
-            }
+        turns: &mut [u32; CHUNK],
+    ) -> bool {
+        let mut any = false;
+        for ((ray, stops), turn) in rays.iter().zip(stops).zip(turns) {
+            let seen =
+                |instance: &u32| self.shown(*instance).is_some_and(|(shown, _)| !shown.is_empty());
+            *turn = iter::from_fn(|| stops.next(ray.t_max)).find(seen).unwrap_or(NONE);
+            any |= *turn != NONE;
         }
-        turns[..count].sort_unstable();
-        count
+        any
     }
 
-    /// Whether the same question is asked of the same block.
-    fn go_together(&self, a: &Turn, b: &Turn) -> bool {
-        let alike = a.instance == b.instance || self.options.skip.is_none();
-        a.child == b.child && alike
-    }
-
-    /// Asks a child about rays in its space: all for whom it is the same question.
+    /// Asks the child that the first ray goes to about all rays in its space for which that is the same question; their turns
+    /// are over. False if none goes anywhere.
     fn visit<A: Asked>(
         &self,
-        turns: &[Turn],
-        rays: &[Ray],
+        turns: &mut [u32; CHUNK],
+        given: &[Ray],
         room: &mut Room<A::Answer>,
         answers: &mut [A::Answer],
-    ) {
-        let first = turns.first().and_then(|turn| self.shown(turn.instance));
-        let Some((shown, _)) = first else { return };
-        let Room { there, who, met } = room;
+    ) -> bool {
+        let first = turns.iter().copied().find(|turn| *turn != NONE);
+        let Some((shown, of_first)) = first.and_then(|instance| self.shown(instance)) else {
+            return false;
+        };
         let mut count = 0;
-        for turn in turns {
-            let ray = &rays[turn.ray as usize];
-            if let Some(ray) = self.shown(turn.instance).and_then(|(_, at)| at.object_ray(ray)) {
-                (there[count], who[count]) = (ray, *turn);
+        for (i, (ray, turn)) in given.iter().zip(turns).enumerate() {
+            let Some((_, record)) = self.shown(*turn) else { continue };
+            let alike = shown.instance == *turn || self.options.skip.is_none();
+            if record.child != of_first.child || !alike {
+                continue;
+            }
+            let instance = mem::replace(turn, NONE);
+            if let Some(ray) = record.object_ray(ray) {
+                (room.rays[count], room.who[count]) = (ray, Traveller { instance, ray: i });
                 count += 1;
             }
         }
-        let (there, met) = (&there[..count], &mut met[..count]);
-        let question = A::question(shown.choice(self.options));
+        let (rays, who) = (&room.rays[..count], &room.who[..count]);
+        let (met, question) = (&mut room.met[..count], A::question(shown.choice(self.options)));
         if count < FEW {
-            batch::ask_each(shown.block, there, met, question);
+            batch::ask_each(shown.block, rays, met, question);
         } else {
-            let manner = manner_of::<A>(shown.block, there, who);
-            batch::ask_in(manner, shown.block, there, met, question);
+            let manner = manner_of(shown.block, rays, who, A::FAR);
+            batch::ask_in(manner, shown.block, rays, met, question);
         }
-        for (met, turn) in met.iter().zip(who) {
-            let i = turn.ray as usize;
-            A::take(self, &rays[i], turn.instance, *met, &mut answers[i]);
+        for (met, who) in met.iter().zip(who) {
+            A::take(self, &given[who.ray], who.instance, *met, &mut answers[who.ray]);
         }
+        true
     }
 
     fn shown(&self, instance: u32) -> Option<(Shown<'m>, &'m InstanceRecord)> {
         Shown::of(self.level, instance, self.options)
     }
 
-    /// Answers anew for each ray that has something to look for and of which `wanted` says so.
+    /// Answers for each ray by itself if it has something to look for up to a limit of which `wanted` says so.
     fn ask_alone<A: Asked>(
         &self,
         rays: &[Ray],
         answers: &mut [A::Answer],
-        wanted: impl Fn(usize, f32) -> bool,
+        wanted: impl Fn(f32) -> bool,
     ) {
-        for (i, (ray, answer)) in rays.iter().zip(answers).enumerate() {
-            if A::limit(answer, ray).is_some_and(|limit| wanted(i, limit)) {
+        for (ray, answer) in rays.iter().zip(answers) {
+            if A::limit(answer, ray).is_some_and(&wanted) {
                 *answer = A::alone(self.block, ray, self.options);
             }
         }
@@ -271,70 +278,34 @@ impl<'m> Chunk<'_, 'm> {
     }
 }
 
-/// How a child had better be asked about these rays.
-///
-/// Where rays begin says little here: those of a camera begin at one point, and come to a small instance as far apart as any.
-fn manner_of<A: Asked>(child: Finished, rays: &[Ray], turns: &[Turn]) -> Manner {
-    let header = child.header();
-    let middle = [0, 1, 2].map(|k| 0.5 * (header.bounds.lower[k] + header.bounds.upper[k]));
-    let (mut pairs, mut apart, mut sum) = (0, 0, 0.0);
-    for (rays, turns) in rays.windows(2).zip(turns.windows(2)).take(LOOKED_AT) {
-        let distance = largest_difference(passing(&rays[0], middle), passing(&rays[1], middle));
-        let same = turns[0].instance == turns[1].instance;
-        let [a, b] = [0, 1].map(|i| rays[i].direction);
-        let alike = same && largest_difference(a, b) < ALIKE * largest_difference(a, [0.0; 3]);
-        pairs += 1;
-        sum += if alike { distance } else { f32::INFINITY };
-        apart += usize::from(!(alike && distance < A::FAR * header.reach));
-    }
-    match () {
-        () if sum < CLOSE * header.reach * pairs as f32 => Manner::AsTheyAre,
-        () if 2 * apart < pairs => Manner::Stream,
-        () => Manner::Flights,
-    }
-}
-
-/// Where the line of a ray is nearest to a point, or nearly.
-fn passing(ray: &Ray, point: [f32; 3]) -> [f32; 3] {
-    let Ray { origin: o, direction: d, .. } = *ray;
-    let dot = |v: [f32; 3]| v[0] * d[0] + v[1] * d[1] + v[2] * d[2];
-    let t = dot([point[0] - o[0], point[1] - o[1], point[2] - o[2]]) / dot(d);
-    [o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]]
-}
-
-fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
-    (0..3).fold(0.0, |largest, k| f32::max(largest, (b[k] - a[k]).abs()))
-}
-
 const NO_RAY: Ray = Ray::new([0.0; 3], [0.0; 3]);
 
-/// A ray and the instance that it goes to, which shows a child.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Turn {
-    child: u32,
-    instance: u32,
-    ray: u32,
-}
-
-impl Turn {
-    const NONE: Self = Turn { child: 0, instance: NONE, ray: 0 };
+/// Which ray of a chunk one is in the space of an instance, and of which.
+#[derive(Clone, Copy)]
+pub(super) struct Traveller {
+    pub instance: u32,
+    pub ray: usize,
 }
 
 /// Room for the rays that a child is asked about.
 struct Room<Answer> {
-    there: [Ray; CHUNK],
-    who: [Turn; CHUNK],
+    rays: [Ray; CHUNK],
+    who: [Traveller; CHUNK],
     met: [Answer; CHUNK],
 }
 
 impl<Answer> Room<Answer> {
     fn new<A: Asked<Answer = Answer>>() -> Self {
-        Room { there: [NO_RAY; CHUNK], who: [Turn::NONE; CHUNK], met: [A::NOTHING; CHUNK] }
+        let who = [Traveller { instance: NONE, ray: 0 }; CHUNK];
+        Room { rays: [NO_RAY; CHUNK], who, met: [A::NOTHING; CHUNK] }
     }
 }
 
-fn set_limits<A: Asked>(rays: &[Ray], answers: &[A::Answer], limited: &mut [Ray]) {
+/// Limits rays to what they still look for.
+fn limit<A: Asked>(rays: &[Ray], answers: &[A::Answer], limited: &mut [Ray]) {
     for ((ray, answer), limited) in rays.iter().zip(answers).zip(limited) {
-        limited.t_max = A::limit(answer, ray).unwrap_or(f32::NEG_INFINITY);
+        // None is hit by a ray that ends before it begins.
+        let t_max = A::limit(answer, ray).unwrap_or(f32::NEG_INFINITY);
+        *limited = Ray { t_max, ..*ray };
     }
 }
