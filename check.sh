@@ -5,7 +5,7 @@
 #   ./check.sh            all of it, but for most of the other processors
 #   ./check.sh all        these too
 #   ./check.sh STEP ...   some of it: format clippy build test backends docs header c targets fuzz embree stress compare
-#                         bench, or all_targets
+#                         bench report, or all_targets
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
@@ -131,7 +131,12 @@ step_compare() { released run --release --features capi --example compare -- --r
 # The comparison with Embree, cut short: its answers are checked, its times mean nothing here.
 step_bench() { released run --release -p raykern-bench --features embree -- --quick; }
 
-steps=(install format clippy build test backends docs header c targets fuzz embree stress compare bench)
+# Every method on ordinary rays and stress families, every answer judged, and the page.
+step_report() {
+    released run --release -p raykern-bench --features embree --bin report -- --quick --out target/report-check
+}
+
+steps=(install format clippy build test backends docs header c targets fuzz embree stress compare bench report)
 case ${1:-} in
 '') ;;
 all) steps=("${steps[@]/#targets/all_targets}") ;;
