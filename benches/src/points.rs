@@ -46,6 +46,7 @@ pub fn run(options: &Options) -> Result<()> {
 fn measure(name: &str, model: &Model, options: &Options) -> Result<()> {
     let count = options.ray_count() / FEWER;
     let kinds = [("in the box", anywhere(model, count)), ("near", near(model, count))];
+    #[cfg_attr(not(feature = "embree"), expect(unused_mut, reason = "there are no others"))]
     let mut finders = ours(model)?;
     #[cfg(feature = "embree")]
     finders.extend(crate::embree::finders(model, options));
