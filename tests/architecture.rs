@@ -46,7 +46,10 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("surface", &["exact", "instance", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "kinds", "math", "prim", "query", "ray", "simd"]),
     ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
-    ("levels", &["batch", "block", "instance", "math", "prim", "query", "ray", "simd", "trace"]),
+    (
+        "levels",
+        &["batch", "block", "bvh", "instance", "math", "prim", "query", "ray", "simd", "trace"],
+    ),
     ("hits", &["block", "levels", "query", "ray", "trace"]),
     (
         "closest",

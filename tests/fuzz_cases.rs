@@ -5,6 +5,8 @@
 
 #![allow(missing_docs)]
 
+#[path = "../fuzz/src/aim.rs"]
+mod aim;
 #[path = "../fuzz/src/case.rs"]
 mod case;
 #[path = "../fuzz/src/damage.rs"]
@@ -12,6 +14,7 @@ mod damage;
 #[path = "../fuzz/src/scenes.rs"]
 mod scenes;
 
+use aim::Aim;
 use case::{Case, Subject};
 use damage::{Damage, originals};
 use raykern::{Facing, NONE, Precision, PrimId, QueryOptions, Ray};
@@ -156,6 +159,34 @@ fn blocks_that_are_damaged_at_random() {
         accepted += usize::from(damage.check(&originals));
     }
     assert!((400..3_600).contains(&accepted), "{accepted} of 4000 were accepted");
+}
+
+/// What belongs to instances and to refitting.
+#[test]
+fn blocks_that_are_damaged_where_it_hurts() {
+    let originals = originals();
+    let mut random = Random::new(5);
+    let rays = vec![
+        Ray::new([0.3, 0.4, 5.0], [-0.0, 0.0, -1.0]),
+        Ray::new([-9.0, 0.2, 0.3], [1.0, 0.0, 0.01]),
+    ];
+    let (mut accepted, mut refused) = ([0; 6], [0; 6]);
+    for original in 0..12_000 {
+        let part = random.below(6);
+        let word = match random.below(5) {
+            0 => random.below(8) as u32,
+            1 => [f32::NAN, f32::INFINITY, -f32::MAX, 1e-45][random.below(4)].to_bits(),
+            2 => u32::MAX - random.below(2) as u32,
+            3 => 1 << random.below(32),
+            _ => (random.between(-2.0, 2.0) as f32).to_bits(),
+        };
+        let aimed = vec![(Aim { part, word: random.below(1 << 12) }, word)];
+        let damage = Damage { original, aimed, rays: rays.clone(), ..Damage::default() };
+        let counts = if damage.check(&originals) { &mut accepted } else { &mut refused };
+        counts[part] += 1;
+    }
+    println!("{accepted:?} accepted, {refused:?} refused");
+    assert!(accepted.iter().chain(&refused).all(|count| *count > 20), "{accepted:?} {refused:?}");
 }
 
 #[test]

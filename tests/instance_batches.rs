@@ -60,11 +60,11 @@ fn a_field_of_instances() {
     let accels: Vec<_> = children.iter().map(OwnedAccel::accel).collect();
     let instances = field(&accels, 150, 1.7);
     let plane: Model = make::plane(16).placed(30.0, [-15.0, -15.0, -3.0]).into();
-    let odd = with_odd_ones(strewn_rays(1_000, [12.0, 2.0, 12.0]));
+    let odd = with_odd_ones(strewn_rays(500, [12.0, 2.0, 12.0]));
     let rays = [
-        camera(64, [0.5, 8.0, 30.0], [0.0; 3], 12.0),
-        camera(64, [1.5, 3.0, 9.0], [0.2, 0.1, 0.2], 1.0),
-        camera(64, [0.9, 12.0, 1.3], [0.85, 0.0, 0.85], 0.02),
+        camera(32, [0.5, 8.0, 30.0], [0.0; 3], 12.0),
+        camera(32, [1.5, 3.0, 9.0], [0.2, 0.1, 0.2], 1.0),
+        camera(32, [0.9, 12.0, 1.3], [0.85, 0.0, 0.85], 0.02),
         odd,
     ];
     for own in [Model::default(), plane] {
@@ -72,11 +72,11 @@ fn a_field_of_instances() {
         for rays in &rays {
             for (name, accel) in &structures.accels()[..] {
                 let hits = same_in_a_batch(name, accel, rays);
-                assert!(hits > 200, "{name} {hits}");
+                assert!(hits > 100, "{name} {hits}");
             }
         }
         let (name, accel) = structures.accels()[0];
-        for count in [0, 1, 2, 3, 4, 15, 16, 17, 127, 128, 129, 300] {
+        for count in [0, 1, 3, 4, 15, 16, 17, 127, 128, 129, 300] {
             same_in_a_batch(name, &accel, &rays[0][..count]);
             same_in_a_batch(name, &accel, &rays[3][..count]);
         }
@@ -147,7 +147,7 @@ fn ties_of_instances() {
     let child = built(&model);
     let same = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let beside = |x: f32| [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    let rays = camera(64, [0.5, 1.0, 4.0], [0.0; 3], 1.2);
+    let rays = camera(32, [0.5, 1.0, 4.0], [0.0; 3], 1.2);
     let mut instances: Vec<_> =
         (0..20).map(|i| Instance::new(&child.accel(), beside(3.0 * i as f32 - 30.0))).collect();
     instances.push(Instance::new(&child.accel(), same));
@@ -156,7 +156,7 @@ fn ties_of_instances() {
         let all = own.with_scene(|scene| All::build(&scene.with_instances(&instances)));
         for (name, accel) in all.accels() {
             let hits = same_in_a_batch(name, &accel, &rays);
-            assert!(hits > 1_000, "{name} {hits}");
+            assert!(hits > 500, "{name} {hits}");
         }
     }
 }

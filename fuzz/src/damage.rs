@@ -12,6 +12,7 @@ use raykern::{QueryOptions, Ray};
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
 
+use crate::aim::Aim;
 use crate::case::Bytes;
 
 /// A built block with words written over it, or whole bytes, and rays.
@@ -23,6 +24,8 @@ pub struct Damage {
     pub words: Vec<(usize, u32)>,
     /// Bytes from which on, where a copy of them goes, and how many: modulo the size of the block. Done before the words.
     pub copies: Vec<[usize; 3]>,
+    /// Words of parts that are few but matter, and what stands there instead; the places are those of the sound block.
+    pub aimed: Vec<(Aim, u32)>,
     /// If there are any, the block instead of an original.
     pub bytes: Vec<u8>,
     /// What is asked.
@@ -72,14 +75,24 @@ fn packed() -> Vec<Vec<u8>> {
         model.with_scene(|scene| OwnedAccel::bvh(scene, &BuildOptions::default()).expect("a BVH"))
     });
     let map = |x: f32| [1.0, 0.2, 0.0, x, 0.0, -1.0, 0.3, 0.0, 0.1, 0.0, 2.0, 0.5];
-    let instances = [0, 1, 0, 0].map(|i| Instance::new(&children[i].accel(), map(i as f32)));
-    let scene = Scene::new(&[], &[]).with_instances(&instances);
-    let grid = OwnedAccel::grid(&scene, &BuildOptions::default());
-    [OwnedAccel::bvh(&scene, &BuildOptions::default()), grid]
-        .map(|built| {
+    let place = |i: usize| Instance::new(&children[i % 3 % 2].accel(), map(i as f32 / 8.0));
+    let (few, many): (Vec<_>, Vec<_>) = ((0..4).map(place).collect(), (0..30).map(place).collect());
+    let never = BuildOptions { plain_list: PlainList::Never, ..Default::default() };
+    let mut blocks = Vec::new();
+    for instances in [few, many] {
+        let scene = Scene::new(&[], &[]).with_instances(&instances);
+        let built = [
+            OwnedAccel::bvh(&scene, &BuildOptions::default()),
+            OwnedAccel::grid(&scene, &never),
+            OwnedAccel::bvh(&scene, &BuildOptions { layout: Layout::Compact, ..never }),
+            OwnedAccel::bvh(&scene, &BuildOptions { layout: Layout::Wide(8), ..never }),
+            OwnedAccel::bvh(&scene, &BuildOptions { plain_list: PlainList::Always, ..never }),
+        ];
+        blocks.extend(built.map(|built| {
             built.expect("a structure").packed().expect("a block").accel().block().to_vec()
-        })
-        .to_vec()
+        }));
+    }
+    blocks
 }
 
 /// More than both roots of everything in these blocks.
@@ -97,7 +110,9 @@ impl Damage {
             let count = count.min(size - from).min(size - to);
             block.copy_within(from..from + count, to);
         }
-        for &(at, word) in &self.words {
+        let sound = &originals[self.original % originals.len()];
+        let aimed = self.aimed.iter().filter_map(|(aim, word)| Some((aim.place(sound)?, *word)));
+        for (at, word) in self.words.iter().copied().chain(aimed) {
             let at = at % block.len();
             for (byte, new) in block[at..].iter_mut().zip(word.to_le_bytes()) {
                 *byte = new;
@@ -165,12 +180,13 @@ impl Damage {
 /// The damage as an element of the table in `tests/fuzz_cases.rs`.
 impl fmt::Display for Damage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Damage { original, words, copies, bytes, rays } = self;
+        let Damage { original, words, copies, aimed, bytes, rays } = self;
         let rays = format!("{rays:?}").replace("inf", "f32::INFINITY").replace("NaN", "f32::NAN");
         writeln!(f, "Damage {{")?;
         writeln!(f, "    original: {original},")?;
         writeln!(f, "    words: vec!{words:?},")?;
         writeln!(f, "    copies: vec!{copies:?},")?;
+        writeln!(f, "    aimed: vec!{aimed:?},")?;
         writeln!(f, "    bytes: vec!{bytes:?},")?;
         writeln!(f, "    rays: vec!{rays},")?;
         writeln!(f, "}}")

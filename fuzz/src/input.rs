@@ -8,6 +8,7 @@ use arbitrary::{Result, Unstructured};
 use raykern::{Facing, NONE, Precision, PrimId, QueryOptions, Ray};
 use raykern_harness::model::{Model, TriangleMesh};
 
+use crate::aim::Aim;
 use crate::case::Case;
 use crate::damage::Damage;
 
@@ -343,6 +344,10 @@ impl Damage {
         for _ in 0..maker.below(3)? {
             let copy = maker.copy()?;
             damage.copies.push(copy);
+        }
+        for _ in 0..maker.below(4)? {
+            let (part, (place, value)) = (maker.below(6)?, maker.word()?);
+            damage.aimed.push((Aim { part, word: place / 4 }, value));
         }
         Ok(damage)
     }

@@ -1,5 +1,6 @@
 //! What the fuzz targets share: bytes become cases, cases are checked.
 
+pub mod aim;
 pub mod case;
 pub mod damage;
 pub mod input;

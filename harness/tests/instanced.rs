@@ -9,9 +9,7 @@ use raykern::{BuildOptions, Hit, OwnedAccel, PlainList, Scene};
 use raykern_harness::assembly::{Assembly, Place};
 use raykern_harness::load::load;
 use raykern_harness::make;
-use raykern_harness::render::{
-    Camera, Image, Job, RenderScene, Tracer, hit_mask, read_png, render,
-};
+use raykern_harness::render::{Camera, Image, Job, RenderScene, hit_mask, read_png, render};
 use raykern_harness::shared_scenes;
 
 type Build =
@@ -205,7 +203,7 @@ fn ellipsoids_are_where_their_equation_says() {
                 continue;
             }
             let first = all.iter().filter_map(|(t, _)| *t).fold(f64::INFINITY, f64::min);
-            let hit = Tracer::intersect(&owned.accel(), &ray);
+            let hit = owned.accel().intersect(&ray);
             match hit.filter(|hit| hit.instance != raykern::NONE) {
                 None => {
                     assert!(hit.is_some_and(|hit| f64::from(hit.t) < first) || first.is_infinite())

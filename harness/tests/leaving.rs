@@ -5,12 +5,13 @@
 //! where a ray starts, or one that a ray starts beyond, makes another number; so does a gap.
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use raykern::{Accel, BuildOptions, Facing, Hit, OwnedAccel, PrimId, QueryOptions, Ray, Surface};
 use raykern_harness::load::load;
 use raykern_harness::make::Random;
 use raykern_harness::model::{Model, TriangleMesh};
-use raykern_harness::render::RenderScene;
+use raykern_harness::render::{Image, Job, RenderScene, read_png, render};
 use raykern_harness::{scenes, shared_scenes};
 
 /// Whether each edge has as many triangles on one side as on the other.
@@ -117,6 +118,54 @@ fn the_glass_tree() {
     };
     let scene = load(&folder.join("metu/scienceTree_glass.xml")).unwrap_or_else(|e| panic!("{e}"));
     check("scienceTree_glass", &scene, 17);
+}
+
+/// How many pixels differ by more than two levels in some colour.
+fn far(a: &Image, b: &Image) -> usize {
+    let pairs = a.pixels.iter().zip(&b.pixels);
+    pairs.filter(|(a, b)| (0..3).any(|k| a[k].abs_diff(b[k]) > 2)).count()
+}
+
+/// Draws `scene` without any epsilon, once from origins beside the surface and once from the surface itself, and compares both
+/// with `expected`.
+fn check_picture(name: &str, scene: &RenderScene, expected: &Image, allowed: usize) {
+    let owned = scene.model.build(|s| OwnedAccel::bvh(s, &BuildOptions::default()));
+    let owned = owned.expect("a build");
+    let picture = |epsilon: f64| {
+        let scene = RenderScene { shadow_ray_epsilon: epsilon, ..scene.clone() };
+        let mut camera = scene.cameras[0].clone();
+        camera.resolution = expected.resolution;
+        render(&scene, &owned.accel(), &Job::whole(&camera)).image
+    };
+    // So little moves nothing.
+    let [exact, naive] = [0.0, 1e-30].map(picture);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    for (image, what) in [(&exact, "exact"), (&naive, "naive")] {
+        let file = folder.join(format!("leaving_{name}_{what}.png"));
+        image.write_png(&file).expect("a picture");
+        println!("{}", file.display());
+    }
+    let [off, acne] = [&exact, &naive].map(|image| far(image, expected));
+    println!("{name}: {off} pixels are off, {acne} when rays start on the surface");
+    assert!(off <= allowed, "{name}: {off} pixels are off, {allowed} allowed");
+    assert!(acne > 50 * allowed, "{name}: {acne} pixels of acne show nothing");
+}
+
+#[test]
+fn pictures_need_no_epsilon() {
+    let scene = scenes::glass();
+    let owned = scene.model.build(|s| OwnedAccel::bvh(s, &BuildOptions::default()));
+    let with_epsilon =
+        render(&scene, &owned.expect("a build").accel(), &Job::whole(&scene.cameras[0])).image;
+    check_picture("glass", &scene, &with_epsilon, 300);
+    let Some(folder) = shared_scenes::folder(None) else {
+        println!("skipped: no folder of scenes (RAYKERN_SCENES)");
+        return;
+    };
+    let metu = folder.join("metu");
+    let scene = load(&metu.join("scienceTree_glass.xml")).unwrap_or_else(|e| panic!("{e}"));
+    let picture = read_png(&metu.join("reference/scienceTree_glass.png"));
+    check_picture("scienceTree_glass", &scene, &picture.unwrap_or_else(|e| panic!("{e}")), 1000);
 }
 
 /// Of a sphere only the root nearest to `t = 0` is skipped: a ray that enters it still leaves it, and one that starts inside

@@ -128,6 +128,7 @@ impl<D: Decide, W: Watch> Search for AnySearch<'_, '_, D, W> {
         (!self.hit).then_some(self.ray.t_max)
     }
 }
+
 /// The block of an instance, or the one that has instances.
 #[derive(Clone, Copy)]
 pub(crate) struct Shown<'m> {

@@ -32,7 +32,8 @@ pub(super) fn visit_by<W: Watch>(
     visit_reached(level, ray, counts, &mut |instance| visit(search, instance));
 }
 
-/// Lets `search` visit one instance.
+/// Lets `search` visit one instance. Out of line: where there are no vectors all of the question is compiled into it.
+#[inline(never)]
 pub(super) fn visit(search: &mut impl Search, instance: u32) -> Option<f32> {
     simd::dispatch(Visit { search, instance })
 }

@@ -81,9 +81,10 @@ impl Asked for Nearest {
     }
 
     fn take(chunk: &Chunk, ray: &Ray, instance: u32, met: Hit, answer: &mut Hit) {
-        let met = Hit { instance, ..met };
-        if met.t < answer.t || met.t == answer.t && chunk.is_before(ray, &met, answer) {
-            *answer = met;
+        let hit = Hit { instance, ..met };
+        let ties = hit.t == answer.t && hit.prim != NONE;
+        if hit.t < answer.t || ties && chunk.is_before(ray, &hit, answer) {
+            *answer = hit;
         }
     }
 
@@ -216,13 +217,14 @@ impl<'m> Chunk<'_, 'm> {
         let Some((shown, of_first)) = first.and_then(|instance| self.shown(instance)) else {
             return false;
         };
+        let goes_along = |instance: u32, record: &InstanceRecord| {
+            let alike = shown.instance == instance || self.options.skip.is_none();
+            record.child == of_first.child && alike
+        };
         let mut count = 0;
         for (i, (ray, turn)) in given.iter().zip(turns).enumerate() {
-            let Some((_, record)) = self.shown(*turn) else { continue };
-            let alike = shown.instance == *turn || self.options.skip.is_none();
-            if record.child != of_first.child || !alike {
-                continue;
-            }
+            let place = self.shown(*turn).filter(|(_, record)| goes_along(*turn, record));
+            let Some((_, record)) = place else { continue };
             let instance = mem::replace(turn, NONE);
             if let Some(ray) = record.object_ray(ray) {
                 (room.rays[count], room.who[count]) = (ray, Traveller { instance, ray: i });
@@ -230,17 +232,29 @@ impl<'m> Chunk<'_, 'm> {
             }
         }
         let (rays, who) = (&room.rays[..count], &room.who[..count]);
-        let (met, question) = (&mut room.met[..count], A::question(shown.choice(self.options)));
-        if count < FEW {
+        let met = &mut room.met[..count];
+        self.ask_child::<A>(&shown, rays, who, met);
+        for (met, who) in met.iter().zip(who) {
+            A::take(self, &given[who.ray], who.instance, *met, &mut answers[who.ray]);
+        }
+        true
+    }
+
+    /// Asks a child about rays in its space.
+    fn ask_child<A: Asked>(
+        &self,
+        shown: &Shown,
+        rays: &[Ray],
+        who: &[Traveller],
+        met: &mut [A::Answer],
+    ) {
+        let question = A::question(shown.choice(self.options));
+        if rays.len() < FEW {
             batch::ask_each(shown.block, rays, met, question);
         } else {
             let manner = manner_of(shown.block, rays, who, A::FAR);
             batch::ask_in(manner, shown.block, rays, met, question);
         }
-        for (met, who) in met.iter().zip(who) {
-            A::take(self, &given[who.ray], who.instance, *met, &mut answers[who.ray]);
-        }
-        true
     }
 
     fn shown(&self, instance: u32) -> Option<(Shown<'m>, &'m InstanceRecord)> {

@@ -12,7 +12,7 @@ mod shade;
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use raykern::{Accel, Counts, Hit, QueryOptions, Ray};
+use raykern::{Accel, Counts, Hit, PrimId, QueryOptions, Ray, Surface};
 
 pub use self::camera::{Camera, CameraError};
 pub use self::image::{Image, ImageError, read_png};
@@ -21,20 +21,36 @@ pub use self::shade::Shader;
 
 /// What answers rays.
 pub trait Tracer {
-    /// The closest hit.
-    fn intersect(&self, ray: &Ray) -> Option<Hit>;
-    /// Whether anything is hit.
-    fn occluded(&self, ray: &Ray) -> bool;
+    /// The closest hit of anything but `skip`.
+    fn intersect(&self, ray: &Ray, skip: Option<PrimId>) -> Option<Hit>;
+    /// Whether anything but `skip` is hit.
+    fn occluded(&self, ray: &Ray, skip: Option<PrimId>) -> bool;
+    /// The surface where the ray was found to hit.
+    fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface>;
 }
 
 impl Tracer for Accel<'_> {
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        Accel::intersect(self, ray)
+    fn intersect(&self, ray: &Ray, skip: Option<PrimId>) -> Option<Hit> {
+        match skip {
+            None => Accel::intersect(self, ray),
+            Some(_) => self.intersect_with(ray, &all_but(skip)),
+        }
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
-        Accel::occluded(self, ray)
+    fn occluded(&self, ray: &Ray, skip: Option<PrimId>) -> bool {
+        match skip {
+            None => Accel::occluded(self, ray),
+            Some(_) => self.occluded_with(ray, &all_but(skip)),
+        }
     }
+
+    fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
+        Accel::surface(self, ray, hit)
+    }
+}
+
+fn all_but(skip: Option<PrimId>) -> QueryOptions {
+    QueryOptions { skip, ..QueryOptions::default() }
 }
 
 /// An accel that adds up what its queries did.
@@ -63,12 +79,16 @@ impl<'a> Counting<'a> {
 }
 
 impl Tracer for Counting<'_> {
-    fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.count(|counts| self.accel.intersect_counted(ray, &QueryOptions::default(), counts))
+    fn intersect(&self, ray: &Ray, skip: Option<PrimId>) -> Option<Hit> {
+        self.count(|counts| self.accel.intersect_counted(ray, &all_but(skip), counts))
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.count(|counts| self.accel.occluded_counted(ray, &QueryOptions::default(), counts))
+    fn occluded(&self, ray: &Ray, skip: Option<PrimId>) -> bool {
+        self.count(|counts| self.accel.occluded_counted(ray, &all_but(skip), counts))
+    }
+
+    fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
+        self.accel.surface(ray, hit)
     }
 }
 
@@ -162,7 +182,8 @@ pub fn hit_mask(scene: &RenderScene, tracer: &impl Tracer, camera: &Camera) -> V
     let shader = Shader::new(scene, tracer);
     let [width, height] = camera.resolution;
     let pixels = (0..height).flat_map(|j| (0..width).map(move |i| (i, j)));
-    pixels.map(|(i, j)| tracer.intersect(&shader.limited(&camera.ray(i, j))).is_some()).collect()
+    let hits = |(i, j)| tracer.intersect(&shader.limited(&camera.ray(i, j)), None).is_some();
+    pixels.map(hits).collect()
 }
 
 /// How many pixels to render between two looks at the clock: about a millisecond's worth, so that

@@ -26,7 +26,8 @@ pub struct RenderScene {
     pub cameras: Vec<Camera>,
     /// What a primary ray sees that hits nothing.
     pub background: DVec3,
-    /// How far the origin of a secondary ray is moved along the normal.
+    /// How far the origin of a secondary ray is moved along the normal; at 0 it is one that is surely beside the surface, and
+    /// the primitive is skipped.
     pub shadow_ray_epsilon: f64,
     /// The least distance at which a primary ray may hit.
     pub intersection_epsilon: f64,
@@ -162,28 +163,25 @@ impl RenderScene {
         &self.materials[number]
     }
 
-    /// The unit normal at `position`, which was met: that of the triangle's order, or outward.
+    /// The unit normal at `position`, which was met: that of the triangle's order, or outward; in an instance, the one that is
+    /// mapped with the surface, so that what is outside stays so.
     pub fn normal(&self, hit: &Hit, position: DVec3) -> DVec3 {
-        let (model, map) = match self.model.places.get(hit.instance as usize) {
-            Some(place) => (&self.model.children[place.child], place.map()),
-            None => (&self.model.own, DAffine3::IDENTITY),
-        };
+        let place = self.model.places.get(hit.instance as usize);
+        let model = place.map_or(&self.model.own, |place| &self.model.children[place.child]);
+        let inverse = place.map_or(DAffine3::IDENTITY, |place| place.map().inverse());
         let (geometry, prim) = (hit.geometry as usize, hit.prim as usize);
         let wide = |p: [f32; 3]| DVec3::from(p.map(f64::from));
         let normal = match model.meshes.get(geometry) {
             Some(mesh) => {
-                let corner = |v: u32| map.transform_point3(wide(mesh.vertices[v as usize]));
-                let [a, b, c] = mesh.indices[prim].map(corner);
+                let [a, b, c] = mesh.indices[prim].map(|v| wide(mesh.vertices[v as usize]));
                 (b - a).cross(c - a)
             }
             None => {
                 let [x, y, z, _] = model.sphere_sets[geometry - model.meshes.len()][prim];
-                let inverse = map.inverse();
-                let normal = inverse.transform_point3(position) - wide([x, y, z]);
-                inverse.matrix3.transpose() * normal
+                inverse.transform_point3(position) - wide([x, y, z])
             }
         };
-        normal.normalize_or_zero()
+        (inverse.matrix3.transpose() * normal).normalize_or_zero()
     }
 }
 

@@ -1,7 +1,7 @@
 //! From a hit to a colour.
 
 use glam::DVec3;
-use raykern::{Hit, Ray};
+use raykern::{Hit, PrimId, Ray};
 
 use super::scene::{Material, MaterialKind, RenderScene};
 use super::{RayCounts, Tracer};
@@ -21,6 +21,10 @@ struct Point {
     normal: DVec3,
     /// Of length one, away from the ray's origin.
     direction: DVec3,
+    /// Where rays leave that stay on this side and that go through, and what they cannot meet.
+    before: DVec3,
+    beyond: DVec3,
+    skip: Option<PrimId>,
 }
 
 impl<'a, T: Tracer> Shader<'a, T> {
@@ -38,7 +42,7 @@ impl<'a, T: Tracer> Shader<'a, T> {
     pub fn primary(&mut self, ray: &Ray) -> DVec3 {
         self.rays.primary += 1;
         let ray = self.limited(ray);
-        match self.tracer.intersect(&ray) {
+        match self.tracer.intersect(&ray, None) {
             Some(hit) => self.shade(&ray, &hit, 0),
             None => self.scene.background,
         }
@@ -46,10 +50,15 @@ impl<'a, T: Tracer> Shader<'a, T> {
 
     /// The colour that comes along a mirrored or refracted ray, and how far from; black from
     /// nowhere.
-    fn secondary(&mut self, origin: DVec3, direction: DVec3, depth: u32) -> (DVec3, f64) {
+    fn secondary(
+        &mut self,
+        (origin, skip): (DVec3, Option<PrimId>),
+        direction: DVec3,
+        depth: u32,
+    ) -> (DVec3, f64) {
         self.rays.secondary += 1;
         let ray = ray(origin, direction);
-        match self.tracer.intersect(&ray) {
+        match self.tracer.intersect(&ray, skip) {
             Some(hit) => (self.shade(&ray, &hit, depth), f64::from(hit.t)),
             None => (DVec3::ZERO, f64::INFINITY),
         }
@@ -93,9 +102,9 @@ impl<'a, T: Tracer> Shader<'a, T> {
                 continue;
             }
             self.rays.shadow += 1;
-            let origin = point.position + facing * self.scene.shadow_ray_epsilon;
-            let path = light.position - origin;
-            if self.tracer.occluded(&ray(origin, path).with_limits(0.0, 1.0)) {
+            let path = light.position - point.before;
+            let ray = ray(point.before, path).with_limits(0.0, 1.0);
+            if self.tracer.occluded(&ray, point.skip) {
                 continue;
             }
             let half = (to_light - point.direction).normalize_or_zero();
@@ -107,9 +116,8 @@ impl<'a, T: Tracer> Shader<'a, T> {
     }
 
     fn mirrored(&mut self, point: &Point, depth: u32) -> DVec3 {
-        let facing = point.facing_normal();
-        let origin = point.position + facing * self.scene.shadow_ray_epsilon;
-        self.secondary(origin, point.direction.reflect(facing), depth + 1).0
+        let direction = point.direction.reflect(point.facing_normal());
+        self.secondary((point.before, point.skip), direction, depth + 1).0
     }
 
     fn dielectric(
@@ -123,13 +131,12 @@ impl<'a, T: Tracer> Shader<'a, T> {
         let facing = point.facing_normal();
         let ratio = if inside { refraction_index } else { refraction_index.recip() };
         let cosine = -point.direction.dot(facing);
-        let epsilon = self.scene.shadow_ray_epsilon;
         let fade = |color: DVec3, length: f64, is_inside: bool| {
             let lost = -absorption * length;
             if is_inside && length.is_finite() { color * exp(lost) } else { color }
         };
         let mirror = point.direction.reflect(facing);
-        let (color, length) = self.secondary(point.position + facing * epsilon, mirror, depth + 1);
+        let (color, length) = self.secondary((point.before, point.skip), mirror, depth + 1);
         let reflected = fade(color, length, inside);
         let square = 1.0 - ratio * ratio * (1.0 - cosine * cosine);
         if square < 0.0 {
@@ -138,16 +145,39 @@ impl<'a, T: Tracer> Shader<'a, T> {
         let beyond = square.sqrt();
         let share = fresnel_dielectric(cosine, beyond, ratio);
         let onward = ratio * point.direction + (ratio * cosine - beyond) * facing;
-        let (color, length) = self.secondary(point.position - facing * epsilon, onward, depth + 1);
+        let (color, length) = self.secondary((point.beyond, point.skip), onward, depth + 1);
         share * reflected + (1.0 - share) * fade(color, length, !inside)
     }
 
     /// The point of a hit, computed in f64 from the ray, and the normal from what is met.
     fn point(&self, ray: &Ray, hit: &Hit) -> Point {
-        let [origin, step] = [ray.origin, ray.direction].map(|v| DVec3::from(v.map(f64::from)));
+        let [origin, step] = [ray.origin, ray.direction].map(wide);
         let position = origin + f64::from(hit.t) * step;
         let normal = self.scene.normal(hit, position);
-        Point { position, normal, direction: step.normalize() }
+        let (before, beyond, skip) = self.leaving(ray, hit, position, normal);
+        Point { position, normal, direction: step.normalize(), before, beyond, skip }
+    }
+
+    /// Where rays leave to this side and to the other, and what they skip.
+    fn leaving(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        position: DVec3,
+        normal: DVec3,
+    ) -> (DVec3, DVec3, Option<PrimId>) {
+        let is_back = wide(ray.direction).dot(normal) > 0.0;
+        let epsilon = self.scene.shadow_ray_epsilon;
+        let exact = || self.tracer.surface(ray, hit);
+        let (front, back, skip) = match (epsilon == 0.0).then(exact).flatten() {
+            Some(surface) => {
+                let Hit { prim, geometry, instance, .. } = *hit;
+                let skip = PrimId { prim, geometry, instance };
+                (wide(surface.front_origin), wide(surface.back_origin), Some(skip))
+            }
+            None => (position + normal * epsilon, position - normal * epsilon, None),
+        };
+        if is_back { (back, front, skip) } else { (front, back, skip) }
     }
 }
 
@@ -162,6 +192,10 @@ impl Point {
     fn facing_normal(&self) -> DVec3 {
         if self.direction.dot(self.normal) > 0.0 { -self.normal } else { self.normal }
     }
+}
+
+fn wide(v: [f32; 3]) -> DVec3 {
+    DVec3::from(v.map(f64::from))
 }
 
 fn ray(origin: DVec3, direction: DVec3) -> Ray {
