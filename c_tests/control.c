@@ -122,6 +122,14 @@ static void ask(const Subject *s, const RtAccel *accel) {
             KEEP(found = rt_intersect_with(accel, &s->rays[i], &query, &answers.with[p][i]));
             KEEP(answers.occluded_with[p][i] = rt_occluded_with(accel, &s->rays[i], &query));
             CHECK(found == answers.occluded_with[p][i]);
+            if (p != RT_PRECISION_WATERTIGHT) continue;
+            // The same by the calls that link nothing else.
+            RtHit hit;
+            bool met, hidden;
+            KEEP(met = rt_intersect_watertight(accel, &s->rays[i], &hit));
+            KEEP(hidden = rt_occluded_watertight(accel, &s->rays[i]));
+            CHECK(met == found && hidden == found);
+            CHECK(memcmp(&hit, &answers.with[p][i], sizeof hit) == 0);
         }
         KEEP(status = rt_intersect_batch_with(accel, s->rays, 0, &query, answers.batch_with[p], 0, RAYS));
         CHECK(status == RT_OK);

@@ -205,6 +205,8 @@ static void check_open_and_queries(void) {
     CHECK(rt_query_check(&query) == RT_ERROR_INVALID_ARGUMENT);
     CHECK(!rt_intersect(NULL, &ray, &hit) && !rt_intersect(accel, NULL, &hit));
     CHECK(!rt_intersect(accel, &ray, NULL) && !rt_occluded(NULL, &ray) && !rt_occluded(accel, NULL));
+    CHECK(!rt_intersect_watertight(NULL, &ray, &hit) && !rt_intersect_watertight(accel, &ray, NULL));
+    CHECK(!rt_occluded_watertight(NULL, &ray) && !rt_occluded_watertight(accel, NULL));
     rt_intersect_batch(NULL, &ray, &hit, 1);
     rt_intersect_batch(accel, NULL, &hit, 1);
     CHECK(rt_intersect_batch_with(accel, &ray, 30, NULL, &hit, 0, 1) == RT_ERROR_INVALID_ARGUMENT);

@@ -503,6 +503,14 @@ bool rt_intersect(const RtAccel *accel, const RtRay *ray, RtHit *hit);
 // Whether the ray hits anything: true exactly when `rt_intersect` is. False when a pointer is null.
 bool rt_occluded(const RtAccel *accel, const RtRay *ray);
 
+// `rt_intersect` with RT_PRECISION_WATERTIGHT: no code of the exact answer is linked for it.
+bool rt_intersect_watertight(const RtAccel *accel,
+                             const RtRay *ray,
+                             RtHit *hit);
+
+// `rt_occluded` with RT_PRECISION_WATERTIGHT: true exactly when `rt_intersect_watertight` is.
+bool rt_occluded_watertight(const RtAccel *accel, const RtRay *ray);
+
 // `rt_intersect` for what `query` leaves; null leaves everything. When the query is refused, for a
 // reason that `rt_query_check` tells: false, and nothing is written.
 bool rt_intersect_with(const RtAccel *accel,

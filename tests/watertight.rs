@@ -65,6 +65,7 @@ fn depth_range(model: &Model, ray: &Ray, hit: &Hit) -> Option<[f64; 2]> {
 fn compare(model: &Model, accel: &Accel, ray: &Ray, size: f64, seen: &mut Seen) {
     let (exact, hit) = (accel.intersect(ray), accel.intersect_with(ray, &WATERTIGHT));
     let occluded = accel.occluded_with(ray, &WATERTIGHT);
+    assert_eq!((accel.intersect_watertight(ray), accel.occluded_watertight(ray)), (hit, occluded));
     seen.rays += 1;
     seen.hits += u64::from(exact.is_some());
     seen.false_hits += u64::from(hit.is_some() && exact.is_none());

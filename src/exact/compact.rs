@@ -14,9 +14,10 @@ use crate::math::rounding::UNIT;
 /// Adds `x . (p x q)`, or subtracts it.
 #[inline(never)]
 fn add_volume(sum: &mut Fixed, [x, p, q]: [&[f32; 3]; 3], minus: bool) {
-    for (k, i, j) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
-        sum.add_product([x[k], p[i], q[j]], minus);
-        sum.add_product([x[k], p[j], q[i]], !minus);
+    for (k, x) in x.iter().enumerate() {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        sum.add_product([*x, p[i], q[j]], minus);
+        sum.add_product([*x, p[j], q[i]], !minus);
     }
 }
 
