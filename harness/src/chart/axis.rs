@@ -89,7 +89,7 @@ fn around(low: f64, high: f64) -> (f64, f64) {
     (low / 1.25, high * 1.25)
 }
 
-/// Powers of ten, each or each so many, and where these are few, what is between them.
+/// Powers of ten, each or each so many; where these are few, what is between them; and over a narrow range even steps.
 fn log_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
     let [first, last] = [low.log10().ceil() as i32, high.log10().floor() as i32];
     let power = |p: i32| 10f64.powi(p);
@@ -98,8 +98,14 @@ fn log_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
         let powers = (first..=last).step_by(step);
         return powers.map(|p| (power(p), label(power(p)))).collect();
     }
-    let decades = first - 1..=last;
-    let steps = decades.flat_map(|p| [1.0, 1.5, 2.0, 3.0, 5.0, 7.0].map(|m| m * power(p)));
+    if high / low < 3.0 {
+        let step = even_step(high - low);
+        let numbers = (low / step).ceil() as i64..=(high / step).floor() as i64;
+        return numbers.map(|i| i as f64 * step).map(|x| (x, short(x))).collect();
+    }
+    let between: &[f64] =
+        if high / low < 20.0 { &[1.0, 1.5, 2.0, 3.0, 5.0, 7.0] } else { &[1.0, 2.0, 5.0] };
+    let steps = (first - 1..=last).flat_map(|p| between.iter().map(move |m| m * power(p)));
     let within = steps.filter(|x| (low..=high).contains(x));
     within.map(|x| (x, short(x))).collect()
 }
@@ -139,6 +145,9 @@ mod tests {
         let axis = Placed::over(Scale::Log, [0.4, 1.6].into_iter(), [0, 100]);
         let words: Vec<_> = axis.ticks().into_iter().map(|tick| tick.1).collect();
         assert_eq!(words, ["0.5", "0.7", "1", "1.5", "2"]);
+        let axis = Placed::over(Scale::Log, [1.0, 1.2].into_iter(), [0, 100]);
+        let words: Vec<_> = axis.ticks().into_iter().map(|tick| tick.1).collect();
+        assert_eq!(words, ["0.8", "1", "1.2", "1.4"]);
         let axis = Placed::over(Scale::Linear, [10.0, 90.0].into_iter(), [0, 100]);
         assert_eq!(axis.ticks().len(), 5);
     }

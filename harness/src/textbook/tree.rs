@@ -79,9 +79,6 @@ impl<T: TriangleTest> Tree<T> {
 
     /// The first of the closest hits that the test finds.
     pub fn closest(&self, ray: &Ray) -> Option<(f32, Place)> {
-        if self.triangles.is_empty() {
-            return None;
-        }
         let (line, slabs) = (T::line(ray), Slabs::new(ray));
         let (mut best, mut t_best) = (None, ray.t_max);
         let mut stack = [(0, 0.0); STACK];

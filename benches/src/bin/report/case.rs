@@ -77,6 +77,19 @@ mod tests {
     use crate::methods;
 
     #[test]
+    fn meshes_become_one_in_their_order() {
+        let mesh = |x: f32| TriangleMesh {
+            vertices: vec![[x, 0.0, 0.0], [x, 1.0, 0.0], [x, 0.0, 1.0]],
+            indices: vec![[0, 1, 2]],
+        };
+        let meshes = vec![mesh(1.0), TriangleMesh::default(), mesh(2.0)];
+        let merged = merged(&Model { meshes, sphere_sets: vec![vec![], vec![[1.0; 4]]] });
+        assert_eq!((merged.meshes.len(), merged.sphere_sets.len()), (1, 1));
+        assert_eq!(merged.meshes[0].indices, [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!(merged.meshes[0].vertices[3][0], 2.0);
+    }
+
+    #[test]
     fn others_are_asked_what_they_take_and_ours_everything() {
         let method = |group| methods::all().into_iter().find(|m| m.group == group).unwrap();
         let [ours, test] = [Group::Exact, Group::Textbook].map(method);

@@ -39,7 +39,8 @@ const CHILD: usize = 2_000;
 pub fn measure_triangles(options: &Options) -> Result<()> {
     let mut measured = Measured::default();
     let sizes = (6..).map(|i| 10f64.powf(f64::from(i) / 2.0) as usize);
-    for size in sizes.take_while(|size| *size <= options.largest()) {
+    let wanted = |size: &usize| options.wants_scene(&size.to_string());
+    for size in sizes.take_while(|size| *size <= options.largest()).filter(wanted) {
         eprintln!("  {size} triangles");
         let model: Model = make::blob(size, 1).into();
         let name = model.triangle_count().to_string();

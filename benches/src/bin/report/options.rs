@@ -60,6 +60,11 @@ impl Options {
         self.parts.is_empty() || self.parts.iter().any(|wanted| wanted == part)
     }
 
+    /// Whether a scene is to be measured.
+    pub fn wants_scene(&self, name: &str) -> bool {
+        self.scenes.is_empty() || self.scenes.iter().any(|wanted| name.starts_with(wanted.as_str()))
+    }
+
     /// How many rays of each kind are traced.
     pub fn ray_count(&self) -> usize {
         self.rays.unwrap_or(if self.quick { 4_000 } else { 50_000 }).max(100)
