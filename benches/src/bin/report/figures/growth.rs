@@ -6,6 +6,7 @@ use raykern_harness::fit::PowerLaw;
 
 use super::cost::{Cost, scenes};
 use super::{Figure, lines, number, style};
+use crate::methods::REFERENCE;
 use crate::rows::{Build, Run};
 
 /// What grows.
@@ -110,7 +111,9 @@ fn law(curve: &[(f64, f64)]) -> Option<PowerLaw> {
 
 fn prediction(method: &str, law: &PowerLaw) -> Point {
     let (value, interval) = law.at(FAR);
-    let label = format!("{method}, predicted");
+    // The others would cover each other.
+    let told = ["BVH", REFERENCE].contains(&method);
+    let label = if told { format!("{method}, predicted") } else { String::new() };
     Point { at: (FAR, value), x_interval: None, y_interval: Some(interval), label }
 }
 
