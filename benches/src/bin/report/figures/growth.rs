@@ -4,7 +4,7 @@ use anyhow::Result;
 use raykern_harness::chart::plot::{Axis, Plot, Point, Scale, Series};
 use raykern_harness::fit::PowerLaw;
 
-use super::cost::{Cost, scenes};
+use super::cost::{Cost, measured, scenes};
 use super::{Figure, lines, number, style};
 use crate::methods::REFERENCE;
 use crate::rows::{Build, Run};
@@ -95,9 +95,15 @@ pub fn chart(
     let row = |method: &&str| Some(line(method, &law(&curve(method))?));
     let head = ["method", "exponent", "predicted at 1e9", "low", "high"];
     let table = lines(&head, methods.iter().filter_map(row));
+    let of = |scene: &&str| {
+        let cost = |method: &&str| Cost::of(builds, runs, [family, scene, method]);
+        methods.iter().filter_map(cost).collect::<Vec<_>>()
+    };
+    let costs: Vec<Cost> = scenes.iter().flat_map(of).collect();
     let caption = format!(
-        "Medians of the runs; a flat line grows in proportion. What stands alone at 1e9 is predicted, not measured, by power laws \
+        "A flat line grows in proportion. {} What stands alone at 1e9 is predicted, not measured, by power laws \
          through the {FITTED} largest scenes of a thousand or more: {}.",
+        measured(costs.iter()),
         words(&table, &format!("{}{per}", measure.unit))
     );
     Figure::new(format!("{family}-{}", measure.name), plot.svg(), caption, table)
