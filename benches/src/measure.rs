@@ -224,7 +224,9 @@ mod tests {
 
     #[test]
     fn small_scenes_are_measured_and_all_of_ours_agree() {
-        let options = Options::parse_from(["", "--quick", "--rays", "300", "--runs", "2"]);
+        // Without peers: so few rays over one triangle begin at its corner, where those need not be right.
+        let words = ["", "--quick", "--rays", "300", "--runs", "2", "--peer", "none"];
+        let options = Options::parse_from(words);
         for case in cases(&options) {
             let scene = case.load(&options).expect("a generated scene");
             let result = measure(&case, &scene, &options, &mut Watch::new()).expect("a result");

@@ -39,7 +39,7 @@ const ROW: i32 = 24;
 const BOTTOM: i32 = 64;
 const WORDS: u32 = 14;
 /// For the number at the right.
-const NUMBER: i32 = 150;
+const NUMBER: i32 = 200;
 
 impl Rows {
     /// The chart as SVG text.

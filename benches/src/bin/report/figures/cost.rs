@@ -156,9 +156,26 @@ pub fn break_even(builds: &[Build], runs: &[Run], scene: &str) -> Result<Figure>
         let from = [0.01, 0.1, 1.0, 10.0, 100.0].map(|rays| number(1e9 * cost.total(rays)));
         [vec![(*name).to_owned()], from.to_vec()].concat()
     };
-    let caption = format!("The lowest line is the structure that pays; {}", pays(&all));
+    let caption = format!(
+        "The lowest line is the structure that pays: {} {}",
+        pays(&all),
+        measured(all.iter().map(|(_, cost)| cost))
+    );
     let table = lines(&["structure", "0.01", "0.1", "1", "10", "100"], all.iter().map(row));
     Figure::new(format!("break-even-{scene}"), plot.svg(), caption, table)
+}
+
+/// How often these were measured, in words.
+pub fn measured<'a>(costs: impl Iterator<Item = &'a Cost>) -> String {
+    let counts: Vec<[usize; 2]> = costs.map(|cost| [cost.builds, cost.runs]).collect();
+    let range = |k: usize| {
+        let all = || counts.iter().map(|pair| pair[k]);
+        match (all().min().unwrap_or(0), all().max().unwrap_or(0)) {
+            (least, most) if least == most => least.to_string(),
+            (least, most) => format!("{least} to {most}"),
+        }
+    };
+    format!("Medians of {} builds and {} runs.", range(0), range(1))
 }
 
 /// Who is cheapest from how many rays on.
@@ -214,9 +231,12 @@ pub fn sizes(builds: &[Build], runs: &[Run]) -> Result<Figure> {
         .filter(|(_, took)| took == "list")
         .map(|(count, _)| count)
         .max();
+    let of = |scene: &&str| costs(builds, runs, SIZES, scene).into_iter().map(|(_, cost)| cost);
+    let all: Vec<Cost> = scenes.iter().flat_map(of).collect();
     let caption = format!(
-        "{} The automatic choice takes a list up to {} triangles here.",
+        "{} {} The automatic choice takes a list up to {} triangles here.",
         wins(builds, runs, &scenes),
+        measured(all.iter()),
         lists.map_or("no".to_owned(), |count| count.to_string())
     );
     let row = |scene: &&str| {

@@ -4,8 +4,9 @@ use anyhow::Result;
 use raykern_harness::chart::plot::{Axis, Plot, Point, Scale, Series};
 use raykern_harness::fit::PowerLaw;
 
-use super::cost::{Cost, scenes};
+use super::cost::{Cost, measured, scenes};
 use super::{Figure, lines, number, style};
+use crate::methods::REFERENCE;
 use crate::rows::{Build, Run};
 
 /// What grows.
@@ -94,9 +95,15 @@ pub fn chart(
     let row = |method: &&str| Some(line(method, &law(&curve(method))?));
     let head = ["method", "exponent", "predicted at 1e9", "low", "high"];
     let table = lines(&head, methods.iter().filter_map(row));
+    let of = |scene: &&str| {
+        let cost = |method: &&str| Cost::of(builds, runs, [family, scene, method]);
+        methods.iter().filter_map(cost).collect::<Vec<_>>()
+    };
+    let costs: Vec<Cost> = scenes.iter().flat_map(of).collect();
     let caption = format!(
-        "Medians of the runs; a flat line grows in proportion. What stands alone at 1e9 is predicted, not measured, by power laws \
+        "A flat line grows in proportion. {} What stands alone at 1e9 is predicted, not measured, by power laws \
          through the {FITTED} largest scenes of a thousand or more: {}.",
+        measured(costs.iter()),
         words(&table, &format!("{}{per}", measure.unit))
     );
     Figure::new(format!("{family}-{}", measure.name), plot.svg(), caption, table)
@@ -110,7 +117,9 @@ fn law(curve: &[(f64, f64)]) -> Option<PowerLaw> {
 
 fn prediction(method: &str, law: &PowerLaw) -> Point {
     let (value, interval) = law.at(FAR);
-    let label = format!("{method}, predicted");
+    // The others would cover each other.
+    let told = ["BVH", REFERENCE].contains(&method);
+    let label = if told { format!("{method}, predicted") } else { String::new() };
     Point { at: (FAR, value), x_interval: None, y_interval: Some(interval), label }
 }
 
