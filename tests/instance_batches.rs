@@ -23,7 +23,8 @@ fn built(model: &Model) -> OwnedAccel<'static> {
 /// Sheared and scaled a little, at `step` times the place of number `i` in a square of `side`.
 fn place(random: &mut Random, i: usize, side: usize, step: f64) -> [f32; 12] {
     let mut m = [0.0f64; 12].map(|_| random.between(-0.3, 0.3));
-    for (k, at) in [(i % side) as f64, 0.0, (i / side) as f64].into_iter().enumerate() {
+    for (k, at) in [(i % side) as f64, 0.5 * side as f64, (i / side) as f64].into_iter().enumerate()
+    {
         m[5 * k] += random.between(0.7, 1.2);
         m[4 * k + 3] += step * (at - 0.5 * side as f64);
     }
@@ -64,7 +65,7 @@ fn a_field_of_instances() {
     let rays = [
         camera(32, [0.5, 8.0, 30.0], [0.0; 3], 12.0),
         camera(32, [1.5, 3.0, 9.0], [0.2, 0.1, 0.2], 1.0),
-        camera(32, [0.9, 12.0, 1.3], [0.85, 0.0, 0.85], 0.02),
+        camera(32, [-0.8, 12.0, 1.3], [-0.85, 0.0, 0.85], 0.02),
         odd,
     ];
     for own in [Model::default(), plane] {

