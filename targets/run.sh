@@ -192,16 +192,19 @@ user() { # Rust target, C compiler, emulator
     powerpc64*) install "$2" gcc-powerpc64-linux-gnu libc6-dev-ppc64-cross ;;
     esac
     [ "$3" = - ] || install "$3" qemu-user
+    # The x87 keeps more than a float has.
+    local sse=()
+    [[ $arch != i686* ]] || sse=(-msse2 -mfpmath=sse)
     local folder image=$work/$name.elf small
     folder=$(agree "$1" staticlib)
-    "$2" -O1 -static -I board programs/agree.c board/host.c "$folder/libagree.a" -o "$image"
+    "$2" -O1 "${sse[@]}" -static -I board programs/agree.c board/host.c "$folder/libagree.a" -o "$image"
     native() { if [ "$emulator" = - ]; then "$@"; else "$emulator" "$@"; fi; }
     emulator=$3
     native "$image" >"$work/$name.txt" || { cat "$work/$name.txt" >&2; return 1; }
     same agree.txt "$work/$name.txt"
     # A block of the other byte order is refused; the others give the picture.
     small=$(library "$1" "" freestanding)
-    "$2" -O1 -static -ffp-contract=off -I ../include -I board programs/picture.c board/host.c "$small" -o "$image"
+    "$2" -O1 "${sse[@]}" -static -ffp-contract=off -I ../include -I board programs/picture.c board/host.c "$small" -o "$image"
     native "$image" >"$work/$name.txt"
     case $name in
     powerpc*) same refused.txt "$work/$name.txt" ;;

@@ -152,32 +152,42 @@ impl From<OpenError> for Error {
     }
 }
 
+/// A sentence for each number, in their order: one constant, which a linker leaves out where nobody asks for it. Strings by
+/// themselves it keeps with all others of a unit.
+const MESSAGES: &str = concat!(
+    "done\0",
+    "a pointer is null that must not be\0",
+    "a value is outside its range\0",
+    "a struct is larger than this library knows\0",
+    "an unknown status\0",
+    "a triangle names a vertex that its mesh does not have\0",
+    "the memory is smaller than the minimum\0",
+    "a pointer is not aligned\0",
+    "the scene is too large to be numbered or stored\0",
+    "the bytes are not a raykern block\0",
+    "the block was written on a machine of the other byte order\0",
+    "the block is of another version of the format\0",
+    "the block is longer than the bytes given\0",
+    "the block contradicts itself\0",
+    "this build of the library leaves that out\0",
+    "the ray has no such hit\0",
+    "a fault of the library was stopped\0",
+    "the caller cancelled the build\0",
+    "the block was not built to be refitted\0",
+    "meshes, counts or vertex numbers are not those of the build\0",
+    "the map of an instance has no inverse or is not finite\0",
+    "the accel of an instance has instances itself\0",
+    "the block refers to other blocks by address and was not packed\0",
+);
+
+/// The number of no status, which was one once.
+const UNKNOWN: usize = 4;
+
 fn message(status: RtStatus) -> &'static CStr {
-    match status {
-        RT_OK => c"done",
-        RT_ERROR_NULL_POINTER => c"a pointer is null that must not be",
-        RT_ERROR_INVALID_ARGUMENT => c"a value is outside its range",
-        RT_ERROR_VERSION => c"a struct is larger than this library knows",
-        RT_ERROR_INDEX_OUT_OF_RANGE => c"a triangle names a vertex that its mesh does not have",
-        RT_ERROR_OUT_OF_MEMORY => c"the memory is smaller than the minimum",
-        RT_ERROR_MISALIGNED => c"a pointer is not aligned",
-        RT_ERROR_TOO_LARGE => c"the scene is too large to be numbered or stored",
-        RT_ERROR_NOT_A_BLOCK => c"the bytes are not a raykern block",
-        RT_ERROR_BYTE_ORDER => c"the block was written on a machine of the other byte order",
-        RT_ERROR_BLOCK_VERSION => c"the block is of another version of the format",
-        RT_ERROR_TRUNCATED => c"the block is longer than the bytes given",
-        RT_ERROR_CORRUPT => c"the block contradicts itself",
-        RT_ERROR_LAYOUT => c"this build of the library leaves that out",
-        RT_ERROR_NOT_FOUND => c"the ray has no such hit",
-        RT_ERROR_INTERNAL => c"a fault of the library was stopped",
-        RT_ERROR_CANCELLED => c"the caller cancelled the build",
-        RT_ERROR_SINGULAR => c"the map of an instance has no inverse or is not finite",
-        RT_ERROR_NESTED => c"the accel of an instance has instances itself",
-        RT_ERROR_LINKED => c"the block refers to other blocks by address and was not packed",
-        RT_ERROR_NOT_REFITTABLE => c"the block was not built to be refitted",
-        RT_ERROR_OTHER_SCENE => c"meshes, counts or vertex numbers are not those of the build",
-        _ => c"an unknown status",
-    }
+    let sentence = |number| MESSAGES.as_bytes().split_inclusive(|byte| *byte == 0).nth(number);
+    let number = usize::try_from(status).unwrap_or(UNKNOWN);
+    let bytes = sentence(number).or_else(|| sentence(UNKNOWN)).unwrap_or_default();
+    CStr::from_bytes_until_nul(bytes).unwrap_or_default()
 }
 
 /// A sentence for `status`, also for numbers that are no status. It need not be freed.

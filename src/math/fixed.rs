@@ -47,8 +47,8 @@ impl Fixed {
         let size = [low as u32, high as u32, (high >> 32) as u32];
         let shift = (exponent - LAST) as u32;
         let (place, by) = (shift as usize / 32, shift % 32);
-        // Four words take a product, and one more all sums of them.
-        self.lengthen(place + 5);
+        // The product's 72 bits and those of the shift, five for sums of 24 of them, and the sign.
+        self.lengthen(place + 4);
         // Less a number is plus its flipped bits and one.
         let (flip, mut carry) = (if minus { u32::MAX } else { 0 }, minus);
         let mut below = 0;
