@@ -79,11 +79,11 @@ step_header() {
     local before
     before=$(mktemp)
     cp include/raykern.h "$before"
-    cargo build -p raykern --lib --features header
+    cargo check -p raykern --lib --features header
     if ! cmp -s include/raykern.h "$before"; then
         diff -u "$before" include/raykern.h || true
         cp "$before" include/raykern.h
-        echo "include/raykern.h is stale: cargo build --features header writes it again" >&2
+        echo "include/raykern.h is stale: cargo check --features header writes it again" >&2
         return 1
     fi
 }
