@@ -257,7 +257,7 @@ fn memory_of_a_cancelled_build_may_be_used_again() {
 /// A BVH where rays are many, the scene uneven or its triangles long, a grid where rays are few, a list for a handful.
 #[test]
 fn the_choice_follows_the_rays_and_the_scene() {
-    let surface: Model = make::blob(5_000, 1).into();
+    let surface: Model = make::plane(5_000).into();
     let handful: Model = make::plane(8).into();
     let hair: Model = make::hair(5_000, 1).into();
     let mut stadium = surface.clone();
