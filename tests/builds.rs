@@ -259,7 +259,7 @@ fn memory_of_a_cancelled_build_may_be_used_again() {
 fn the_choice_follows_the_rays_and_the_scene() {
     let surface: Model = make::plane(5_000).into();
     let handful: Model = make::plane(8).into();
-    let hair: Model = make::hair(5_000, 1).into();
+    let hair: Model = make::hair(300_000, 1).into();
     let mut stadium = surface.clone();
     stadium.meshes.push(make::plane(50).placed(1e3, [-5e2, -5e2, -1.0]));
     let kind_of = |model: &Model, rays_per_prim: f32| {
