@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change lands. Needs Rust and a C compiler; installs the rest
-# (Debian packages by name). Some 20 minutes on two cores.
+# (Debian packages by name). A quarter of an hour on two idle cores, or a little more.
 #
 #   ./check.sh            all of it, but for most of the other processors
 #   ./check.sh all        these too
