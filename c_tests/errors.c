@@ -242,7 +242,19 @@ static void check_open_and_queries(void) {
     CHECK(memcmp(accel, out, size) == 0);
 }
 
+// Sentences are told apart by their place alone.
+static void check_words(void) {
+    const struct { RtStatus status; const char *word; } said[] = {
+        {RT_OK, "done"}, {RT_ERROR_VERSION, "larger"}, {4, "unknown"}, {RT_ERROR_INDEX_OUT_OF_RANGE, "vertex"},
+        {RT_ERROR_BYTE_ORDER, "byte order"}, {RT_ERROR_LAYOUT, "leaves that out"}, {RT_ERROR_CANCELLED, "cancelled"},
+        {RT_ERROR_SINGULAR, "inverse"}, {RT_ERROR_LINKED, "packed"}, {RT_ERROR_LINKED + 1, "unknown"}, {-1, "unknown"},
+    };
+    for (size_t i = 0; i < sizeof said / sizeof said[0]; i++)
+        CHECK(strstr(rt_status_message(said[i].status), said[i].word) != NULL);
+}
+
 int main(void) {
+    check_words();
     check_builds();
     check_memory();
     check_refit();

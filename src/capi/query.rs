@@ -9,6 +9,7 @@ use super::versioned::{self, Output, pointer};
 use super::{accel_at, answer, guard};
 use core::mem::offset_of;
 
+use crate::accel::Accel;
 use crate::query::{Facing, Precision, PrimId, QueryOptions};
 use crate::ray::{Hit, Ray};
 use crate::surface::Surface;
@@ -27,17 +28,8 @@ pub unsafe extern "C" fn rt_intersect(
     ray: *const RtRay,
     hit: *mut RtHit,
 ) -> bool {
-    let ask = || -> Result<bool, Error> {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
-        let found = accel.intersect(ray);
-        // SAFETY: not null, aligned, and valid as the caller promises.
-        unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
-        Ok(found.is_some())
-    };
-    answer(|| ask().unwrap_or(false), false)
+    // SAFETY: the caller's promise.
+    unsafe { closest(accel, ray, hit, |accel, ray| Ok(accel.intersect(ray))) }
 }
 
 /// Whether the ray hits anything: true exactly when `rt_intersect` is. False when a pointer is null.
@@ -47,13 +39,8 @@ pub unsafe extern "C" fn rt_intersect(
 /// Both pointers are null or valid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rt_occluded(accel: *const RtAccel, ray: *const RtRay) -> bool {
-    let ask = || -> Result<bool, Error> {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        Ok(accel.occluded(unsafe { ray_at(ray) }?))
-    };
-    answer(|| ask().unwrap_or(false), false)
+    // SAFETY: the caller's promise.
+    unsafe { any(accel, ray, |accel, ray| Ok(accel.occluded(ray))) }
 }
 
 /// `rt_intersect` with RT_PRECISION_WATERTIGHT: no code of the exact answer is linked for it.
@@ -67,17 +54,8 @@ pub unsafe extern "C" fn rt_intersect_watertight(
     ray: *const RtRay,
     hit: *mut RtHit,
 ) -> bool {
-    let ask = || -> Result<bool, Error> {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
-        let found = accel.intersect_watertight(ray);
-        // SAFETY: not null, aligned, and valid as the caller promises.
-        unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
-        Ok(found.is_some())
-    };
-    answer(|| ask().unwrap_or(false), false)
+    // SAFETY: the caller's promise.
+    unsafe { closest(accel, ray, hit, |accel, ray| Ok(accel.intersect_watertight(ray))) }
 }
 
 /// `rt_occluded` with RT_PRECISION_WATERTIGHT: true exactly when `rt_intersect_watertight` is.
@@ -87,13 +65,8 @@ pub unsafe extern "C" fn rt_intersect_watertight(
 /// Both pointers are null or valid.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rt_occluded_watertight(accel: *const RtAccel, ray: *const RtRay) -> bool {
-    let ask = || -> Result<bool, Error> {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        Ok(accel.occluded_watertight(unsafe { ray_at(ray) }?))
-    };
-    answer(|| ask().unwrap_or(false), false)
+    // SAFETY: the caller's promise.
+    unsafe { any(accel, ray, |accel, ray| Ok(accel.occluded_watertight(ray))) }
 }
 
 /// `rt_intersect` for what `query` leaves; null leaves everything. When the query is refused, for a
@@ -109,19 +82,10 @@ pub unsafe extern "C" fn rt_intersect_with(
     query: *const RtQuery,
     hit: *mut RtHit,
 ) -> bool {
-    let ask = || -> Result<bool, Error> {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
-        // SAFETY: the caller's promise.
-        let options = unsafe { query_options(query) }?;
-        let found = accel.intersect_with(ray, &options);
-        // SAFETY: not null, aligned, and valid as the caller promises.
-        unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
-        Ok(found.is_some())
-    };
-    answer(|| ask().unwrap_or(false), false)
+    // SAFETY: the caller's promise.
+    let options = || unsafe { query_options(query) };
+    // SAFETY: the caller's promise.
+    unsafe { closest(accel, ray, hit, |accel, ray| Ok(accel.intersect_with(ray, &options()?))) }
 }
 
 /// `rt_occluded` for what `query` leaves; null leaves everything. False when the query is refused.
@@ -135,14 +99,53 @@ pub unsafe extern "C" fn rt_occluded_with(
     ray: *const RtRay,
     query: *const RtQuery,
 ) -> bool {
+    // SAFETY: the caller's promise.
+    let options = || unsafe { query_options(query) };
+    // SAFETY: the caller's promise.
+    unsafe { any(accel, ray, |accel, ray| Ok(accel.occluded_with(ray, &options()?))) }
+}
+
+/// The closest hit as `ask` finds it, written down.
+///
+/// # Safety
+///
+/// As for [`rt_intersect`].
+#[inline(always)]
+unsafe fn closest(
+    accel: *const RtAccel,
+    ray: *const RtRay,
+    hit: *mut RtHit,
+    ask: impl FnOnce(&Accel, &Ray) -> Result<Option<Hit>, Error>,
+) -> bool {
     let ask = || -> Result<bool, Error> {
         // SAFETY: the caller's promise.
         let accel = unsafe { accel_at(accel) }?;
         // SAFETY: the caller's promise.
-        let ray = unsafe { ray_at(ray) }?;
+        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
+        let found = ask(&accel, ray)?;
+        // SAFETY: not null, aligned, and valid as the caller promises.
+        unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
+        Ok(found.is_some())
+    };
+    answer(|| ask().unwrap_or(false), false)
+}
+
+/// Whether `ask` finds any hit.
+///
+/// # Safety
+///
+/// As for [`rt_occluded`].
+#[inline(always)]
+unsafe fn any(
+    accel: *const RtAccel,
+    ray: *const RtRay,
+    ask: impl FnOnce(&Accel, &Ray) -> Result<bool, Error>,
+) -> bool {
+    let ask = || -> Result<bool, Error> {
         // SAFETY: the caller's promise.
-        let options = unsafe { query_options(query) }?;
-        Ok(accel.occluded_with(ray, &options))
+        let accel = unsafe { accel_at(accel) }?;
+        // SAFETY: the caller's promise.
+        ask(&accel, unsafe { ray_at(ray) }?)
     };
     answer(|| ask().unwrap_or(false), false)
 }

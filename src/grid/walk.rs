@@ -100,6 +100,7 @@ fn bound_of<S: Simd>(s: S, t_bound: f32, start: f64) -> <S as Width<4>>::V {
 #[inline(never)]
 fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut Q) -> bool {
     let (leaves, slab) = (&cells.leaves, &WideSlab::new(ray));
+    // Instances are not handed on by pointers.
     if SMALL || Q::OF_INDEX {
         leaves.intersect_all(Scalar, ray, slab, query)
     } else {
