@@ -98,9 +98,12 @@ impl ExactMet {
     }
 
     /// Whether the real `t` is within the ray's limits, in real arithmetic.
+    ///
+    /// By value, here and below: what only a copy of is lent out of line can stay in registers, and what is written to memory
+    /// by parts is slow to read as a whole.
     #[cold]
     #[inline(never)]
-    fn is_within(&self, ray: &PreparedRay) -> bool {
+    fn is_within(self, ray: &PreparedRay) -> bool {
         Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
             t.compare_with(ray.given.t_min) != Ordering::Less
                 && t.compare_with(ray.given.t_max) != Ordering::Greater
@@ -111,7 +114,7 @@ impl ExactMet {
     #[cold]
     #[inline(never)]
     fn is_really_before(
-        &self,
+        self,
         ray: &PreparedRay,
         best: &ExactMet,
         prim_ids: &[u32],
@@ -127,9 +130,9 @@ impl ExactMet {
         let distance = |met: &ExactMet| Distance::new(&ray.line(), &met.meeting);
         let order = match memory {
             Some(memory) if !SMALL => {
-                distance(self).zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best))
+                distance(&self).zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best))
             }
-            _ => distance(self).zip(distance(best)).map(|(mine, best)| mine.compare(&best)),
+            _ => distance(&self).zip(distance(best)).map(|(mine, best)| mine.compare(&best)),
         };
         match order {
             Some(Ordering::Less) => true,
