@@ -131,7 +131,7 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     s: S,
     bundles: &[Bundle<W>],
     leaves: &Leaves,
-    late: &mut impl Late,
+    (late, prepared): (&impl Late, &mut Option<PreparedRay>),
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
@@ -147,15 +147,15 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
                 return false;
             }
             fetch(s, bundles, leaves, walk.later());
-            if late.prepared().is_none() {
+            if prepared.is_none() {
                 // Many rays pass the whole scene by, so this is worth a question a bundle.
                 if walk.at() == ChildRef::NONE {
                     return false;
                 }
-                late.prepare();
+                *prepared = Some(late.prepare());
             }
         }
-        let (false, Some(ray)) = (walk.at() == ChildRef::NONE, late.prepared()) else {
+        let (false, Some(ray)) = (walk.at() == ChildRef::NONE, prepared.as_ref()) else {
             return false;
         };
         if walk.open(s, leaves, ray, query) {

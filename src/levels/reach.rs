@@ -128,15 +128,15 @@ impl<W: Watch> Kernel for Reaching<'_, '_, '_, W> {
     fn run<S: Simd>(self, s: S) -> Option<()> {
         let Reaching { level, ray, widening, visit, watch } = self;
         let block = &level.index.parts();
-        let (mut late, slab) = ray.set_out(s, block.header.reach)?;
+        let (late, slab) = ray.set_out(s, block.header.reach)?;
         let slab = if widening > 0.0 { slab.widened(widening) } else { slab };
         // Where each instance is a leaf its box was tested on the way.
         let alone = !matches!(block.bundles, Bundles::None);
-        let near = (!alone).then(|| Near::new(late.prepare(), f64::from(widening)));
+        let near = (!alone).then(|| Near::new(&late.prepare(), f64::from(widening)));
         let (t_bound, t_scale) = (late.t_max, late.t_scale());
         let mut query =
             Reach { level, visit, t_bound, t_scale, near, visited: [NONE; MAILBOX], watch };
-        trace(s, block, &mut late, &slab, &mut query);
+        trace(s, block, (&late, &mut None), &slab, &mut query);
         Some(())
     }
 }

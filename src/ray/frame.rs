@@ -219,7 +219,6 @@ impl Ray {
             t_min: t_min_below,
             t_max: t_max_above,
             depth,
-            prepared: None,
         };
         Some((ray, slab))
     }
@@ -232,7 +231,7 @@ impl Ray {
         reach: f32,
     ) -> Option<(PreparedRay, NarrowSlab)> {
         let (ray, slab) = self.set_out(s, reach)?;
-        Some((ray.rest(), slab))
+        Some((ray.prepare(), slab))
     }
 
     /// The same without boxes, of any ray that can hit something.
@@ -291,7 +290,6 @@ pub(crate) struct LateRay<S: Simd> {
     t_min: f32,
     pub t_max: f32,
     depth: Axis,
-    prepared: Option<PreparedRay>,
 }
 
 impl<S: Simd> LateRay<S> {
@@ -301,8 +299,17 @@ impl<S: Simd> LateRay<S> {
         f64::from(self.scales.t)
     }
 
+}
+
+/// A ray that is prepared when that is needed. What comes of it is kept elsewhere: it is lent to what is out of line, and
+/// must be in memory for that, but this can stay in registers.
+pub(crate) trait Late {
+    fn prepare(&self) -> PreparedRay;
+}
+
+impl<S: Simd> Late for LateRay<S> {
     #[inline(always)]
-    fn rest(&self) -> PreparedRay {
+    fn prepare(&self) -> PreparedRay {
         let LateRay { given, scales: Scales { t, space }, t_min, t_max, depth, .. } = *self;
         let (origin, direction) = (array::<S>(self.origin), array::<S>(self.direction));
         PreparedRay {
@@ -318,33 +325,13 @@ impl<S: Simd> LateRay<S> {
     }
 }
 
-/// A ray that may not be prepared yet.
-pub(crate) trait Late {
-    fn prepared(&self) -> Option<&PreparedRay>;
-    fn prepare(&mut self) -> &PreparedRay;
-}
+/// Of a ray that is prepared already, who is not asked.
+pub(crate) struct Early;
 
-impl<S: Simd> Late for LateRay<S> {
+impl Late for Early {
     #[inline(always)]
-    fn prepared(&self) -> Option<&PreparedRay> {
-        self.prepared.as_ref()
-    }
-
-    #[inline(always)]
-    fn prepare(&mut self) -> &PreparedRay {
-        self.prepared.insert(self.rest())
-    }
-}
-
-impl Late for PreparedRay {
-    #[inline(always)]
-    fn prepared(&self) -> Option<&PreparedRay> {
-        Some(self)
-    }
-
-    #[inline(always)]
-    fn prepare(&mut self) -> &PreparedRay {
-        self
+    fn prepare(&self) -> PreparedRay {
+        PreparedRay::BLANK
     }
 }
 

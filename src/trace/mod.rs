@@ -15,7 +15,7 @@ use crate::grid::{self, Cells};
 use crate::kinds::{GRID, WIDE};
 use crate::prim::Leaves;
 use crate::query::{Decide, Erased, Meets, Query, Watch, geometry_of};
-use crate::ray::{FrameSlab, Hit, Late, NONE, PreparedRay, Ray, Slab};
+use crate::ray::{Early, FrameSlab, Hit, Late, NONE, PreparedRay, Ray, Slab};
 use crate::simd::{self, Kernel, SMALL, Scalar, Simd};
 
 /// What is asked of a ray.
@@ -79,13 +79,15 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
         // Parts are not lent to what is out of line, which would have them all computed.
         let block = &block.parts();
         let reach = block.header.reach;
-        let Some((mut late, slab)) = ray.set_out(s, reach) else {
+        let Some((late, slab)) = ray.set_out(s, reach) else {
             return ask_any(block.whole, ray, question);
         };
         let mut query = question.query(block, late.t_max);
-        let ended = trace(s, block, &mut late, &slab, &mut query);
+        let mut prepared = None;
+        let ended = trace(s, block, (&late, &mut prepared), &slab, &mut query);
         // Nothing that is not prepared has met anything.
-        late.prepared().map_or(Q::nothing(), |ray| Q::answer(block, ray, &mut query, ended))
+        let Some(ray) = &prepared else { return Q::nothing() };
+        Q::answer(block, ray, &mut query, ended)
     }
 }
 
@@ -96,27 +98,29 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
 fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
     let block = &block.parts();
     let reach = block.header.reach;
-    let Some(mut ray) = ray.prepare_any(reach) else { return Q::nothing() };
+    let mut prepared = ray.prepare_any(reach);
+    let Some(ray) = &prepared else { return Q::nothing() };
     let mut query = question.query(block, ray.t_max);
-    let slab = FrameSlab::new(&ray, reach);
+    let slab = FrameSlab::new(ray, reach);
     // Those who add up stacks do not see through pointers.
     let ended = match Q::Query::ORDERED {
-        _ if SMALL => trace(Scalar, block, &mut ray, &slab, &mut query),
-        true => trace_any(block, &mut ray, &slab, Erased::<true>(&mut query)),
-        false => trace_any(block, &mut ray, &slab, Erased::<false>(&mut query)),
+        _ if SMALL => trace(Scalar, block, (&Early, &mut prepared), &slab, &mut query),
+        true => trace_any(block, &mut prepared, &slab, Erased::<true>(&mut query)),
+        false => trace_any(block, &mut prepared, &slab, Erased::<false>(&mut query)),
     };
-    Q::answer(block, &ray, &mut query, ended)
+    let Some(ray) = &prepared else { return Q::nothing() };
+    Q::answer(block, ray, &mut query, ended)
 }
 
 /// [`trace`] for queries of any type.
 #[inline(never)]
 fn trace_any<const ORDERED: bool>(
     block: &Block,
-    ray: &mut PreparedRay,
+    prepared: &mut Option<PreparedRay>,
     slab: &FrameSlab,
     mut query: Erased<ORDERED>,
 ) -> bool {
-    trace(Scalar, block, ray, slab, &mut query)
+    trace(Scalar, block, (&Early, prepared), slab, &mut query)
 }
 
 /// The record of the meeting that won.
@@ -152,24 +156,28 @@ fn name(block: &Block, place: Place) -> Name {
     Name { prim: number - first, geometry }
 }
 
-/// Offers `query` what the ray meets, by the one traversal of the structure at hand.
+/// Offers `query` what the ray meets, by the one traversal of the structure at hand. The ray is prepared when it enters the
+/// scene's box, unless it is.
 #[inline(always)]
 pub(crate) fn trace<S: Simd, Q: Query>(
     s: S,
     block: &Block,
-    ray: &mut impl Late,
+    (late, prepared): (&impl Late, &mut Option<PreparedRay>),
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     let leaves = &Leaves::of(block);
     match block.bundles {
         Bundles::Sixteen(bundles) if WIDE => {
-            bvh::traverse_wide(s, bundles, leaves, ray, slab, query)
+            bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query)
         }
-        Bundles::Eight(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
-        Bundles::Four(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, ray, slab, query),
+        Bundles::Eight(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query),
+        Bundles::Four(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query),
         _ => {
-            let ray = ray.prepare();
+            if prepared.is_none() {
+                *prepared = Some(late.prepare());
+            }
+            let Some(ray) = prepared else { return false };
             match block.header.kind {
                 KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
                 KIND_GRID if GRID => {
