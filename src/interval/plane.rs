@@ -31,9 +31,11 @@ impl<D: Doubles> PlaneMeeting<D> {
         let along_error = sum_abs(direction).mul(size);
         let clear = along_error.times(1024.0).less(along.abs());
         let t = dot(to_plane, n).div(along);
-        let t_error = sum_abs(to_plane).mul(size).add(t.abs().mul(along_error)).div(along.abs());
-        // A hundredth for the divisor's own error, and the roundings of the quotient.
-        let t_error = t_error.times(1.01).add(t.abs().times(3.0 * UNIT));
+        // A hundredth for the divisor's own error, and the roundings of the quotient. What does not wait for `t` is divided
+        // beside it.
+        let fixed = sum_abs(to_plane).mul(size).times(1.01).div(along.abs());
+        let by_t = along_error.times(1.01).div(along.abs());
+        let t_error = fixed.add(t.abs().mul(by_t)).add(t.abs().times(3.0 * UNIT));
         let aside = cross(to_plane, direction);
         let weights = [dot(e2, aside).div(along), dot(e1, aside).neg().div(along)];
         PlaneMeeting { t, t_error, weights, along, clear }
