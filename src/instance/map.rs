@@ -151,6 +151,7 @@ impl InstanceRecord {
 
     /// The ray in object space: sums in `f64`, in this order and without fusing, rounded once. `None` when a component of that
     /// leaves the range of `f32`, or the direction becomes zero: then the instance is not hit.
+    #[inline(always)]
     pub fn object_ray(&self, ray: &Ray) -> Option<Ray> {
         let m = &self.object_to_world;
         let o = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - f64::from(m[4 * k + 3]));

@@ -87,7 +87,8 @@ impl<D: Across, W: Watch> Search for ClosestSearch<'_, '_, D, W> {
         if let Some((shown, ray)) = place {
             let question =
                 ClosestHit::<D, _, MEMORY>::new(shown.choice(self.options), self.watch.lend());
-            if let Some(hit) = ask_by(s, shown.block, &ray, question) {
+            let mut room = [[0.0; 4]; 2];
+            if let Some(hit) = ask_by(s, shown.block, ray.settled(s, &mut room), question) {
                 self.take(Best { hit: Hit { instance, ..hit }, shown, ray });
             }
         }
@@ -123,7 +124,8 @@ impl<D: Decide, W: Watch> Search for AnySearch<'_, '_, D, W> {
             Shown::at(self.block, self.level, instance, self.options, self.ray)
         {
             let question = AnyHit::<D, _>::new(shown.choice(self.options), self.watch.lend());
-            self.hit = ask_by(s, shown.block, &ray, question);
+            let mut room = [[0.0; 4]; 2];
+            self.hit = ask_by(s, shown.block, ray.settled(s, &mut room), question);
         }
         (!self.hit).then_some(self.ray.t_max)
     }

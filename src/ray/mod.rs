@@ -16,6 +16,8 @@ pub(crate) use frame::{Early, Late, PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, RayPacket, Spread};
 pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
 
+use crate::simd::{Lanes, Simd, Width};
+
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".
 pub const NONE: u32 = u32::MAX;
 
@@ -55,6 +57,17 @@ impl Ray {
     pub(crate) fn row(&self) -> &[f32; 8] {
         // SAFETY: eight floats in C's order, without padding as they fill its 32 bytes.
         unsafe { &*core::ptr::from_ref(self).cast() }
+    }
+
+    /// The same ray in memory that vectors have written, to be read by vectors soon: from parts that is slow.
+    #[allow(unsafe_code, reason = "a promise about the layout drawn here")]
+    #[inline(always)]
+    pub(crate) fn settled<'r, S: Simd>(&self, s: S, room: &'r mut [[f32; 4]; 2]) -> &'r Ray {
+        for (half, to) in self.rows().iter().zip(&mut *room) {
+            Width::<4>::load(s, half).store(to);
+        }
+        // SAFETY: as for `row`.
+        unsafe { &*core::ptr::from_ref(room).cast() }
     }
 
     /// Its halves, each a vector on most machines.

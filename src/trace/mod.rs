@@ -80,7 +80,9 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
         let block = &block.parts();
         let reach = block.header.reach;
         let Some((late, slab)) = ray.set_out(s, reach) else {
-            return ask_any(block.whole, ray, question);
+            // A copy is lent: what was made by parts, as in an instance, had better not go through memory.
+            let ray = *ray;
+            return ask_any(block.whole, &ray, question);
         };
         let mut query = question.query(block, late.t_max);
         let mut prepared = None;
