@@ -3,6 +3,7 @@
 use super::together::Traveller;
 use crate::batch::Manner;
 use crate::block::Finished;
+use crate::block::level::Level;
 use crate::math::Aabb;
 use crate::ray::Ray;
 
@@ -12,6 +13,27 @@ const LOOKED_AT: usize = 12;
 const CLOSE: f32 = 1.0 / 700.0;
 /// Directions that differ less, of their largest component, are alike.
 const ALIKE: f32 = 1.0 / 8.0;
+
+/// Children that take less together, in bytes, are mostly in the cache: then there is nothing to wait for in company.
+const SMALL: usize = 4 << 20;
+/// Of so many children at most this is asked.
+const COUNTED: usize = 64;
+
+/// Whether all children together are small.
+pub(super) fn are_small(level: &Level) -> bool {
+    let sizes = level.children.iter().filter_map(|child| level.child_at(*child));
+    level.children.len() <= COUNTED && sizes.map(|child| child.bytes().len()).sum::<usize>() < SMALL
+}
+
+/// Whether most neighbours run so differently that they come to different instances.
+pub(super) fn are_unlike(rays: &[Ray]) -> bool {
+    let (mut pairs, mut unlike) = (0, 0);
+    for pair in rays.windows(2).take(LOOKED_AT) {
+        pairs += 1;
+        unlike += usize::from(!run_alike(&pair[0], &pair[1]));
+    }
+    2 * unlike > pairs
+}
 
 /// How a child had better be asked about these rays.
 ///
@@ -25,9 +47,7 @@ pub(super) fn manner_of(child: Finished, rays: &[Ray], who: &[Traveller], far: f
     let pair = rays.iter().zip(who);
     for ((a, of_a), (b, of_b)) in pair.clone().zip(pair.skip(1)).take(LOOKED_AT) {
         let distance = largest_difference(passing(a, middle), passing(b, middle));
-        let turned = largest_difference(a.direction, b.direction);
-        let alike = of_a.instance == of_b.instance
-            && turned < ALIKE * largest_difference(a.direction, [0.0; 3]);
+        let alike = of_a.instance == of_b.instance && run_alike(a, b);
         pairs += 1;
         sum += if alike { distance } else { f32::INFINITY };
         apart += usize::from(!(alike && distance < far * size));
@@ -37,6 +57,12 @@ pub(super) fn manner_of(child: Finished, rays: &[Ray], who: &[Traveller], far: f
         () if 2 * apart < pairs => Manner::Stream,
         () => Manner::Flights,
     }
+}
+
+/// Whether two rays run nearly the same way.
+fn run_alike(a: &Ray, b: &Ray) -> bool {
+    let turned = largest_difference(a.direction, b.direction);
+    turned < ALIKE * largest_difference(a.direction, [0.0; 3])
 }
 
 /// Where the line of a ray is nearest to a point, or nearly.

@@ -6,7 +6,7 @@
 
 use core::{iter, mem, slice};
 
-use super::manner::manner_of;
+use super::manner::{are_small, are_unlike, manner_of};
 use super::stops::{CHUNK, Gather, Stops};
 use super::{Best, Shown, any, closest};
 use crate::batch::{self, Record};
@@ -128,8 +128,9 @@ fn of_each<A: Asked>(
 ) {
     let Some(level) = &block.level() else { return };
     let (chunk, flies) = (Chunk { block, level, options }, simd::dispatch(Flies));
+    let cached = are_small(level);
     for (rays, answers) in rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)) {
-        if flies {
+        if flies && !(cached && are_unlike(rays)) {
             chunk.ask::<A>(rays, answers);
         } else {
             answers.fill(A::NOTHING);
