@@ -112,12 +112,15 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
             return ask_each(block.whole, rays, answers, question);
         }
         let count = self.rays.len().min(self.answers.len());
-        let mut first = 0;
+        let (mut first, mut room) = (0, None);
         while first < count {
             let (alike, end) = self.stretch(s, first, count);
             let part = self.part(first, end);
             match alike {
-                Some(alike) => part.trace_together(s, alike),
+                Some(alike) => {
+                    let room = room.get_or_insert_with(|| packet::Room::new(alike));
+                    part.trace_together(s, alike, room);
+                }
                 None => part.trace_apart(s),
             }
             first = end;

@@ -13,6 +13,18 @@ use crate::sieve::{Aim, Found, Opened, Sheared};
 use crate::simd::{Lanes, Scalar, Simd, Width};
 use crate::trace::{Firsts, Together};
 
+/// What the packets of a batch use one after the other.
+pub(super) struct Room {
+    packet: RayPacket,
+    sheared: Sheared,
+}
+
+impl Room {
+    pub fn new(alike: Alike) -> Self {
+        Room { packet: RayPacket::new(alike), sheared: [[[0.0; 16]; 2]; 16] }
+    }
+}
+
 /// Rays on their way together.
 ///
 /// What `f32` is sure of needs no more for now: a triangle that surely is met, and surely before what was met so far, takes
@@ -20,7 +32,7 @@ use crate::trace::{Firsts, Together};
 struct Company<'a, 'm, Q: Together<'m>, A> {
     batch: Batch<'a, 'm, Q, A>,
     leaves: Leaves<'m>,
-    packet: RayPacket,
+    packet: &'a mut RayPacket,
     /// One bit for each ray that met something, or that is answered.
     met: [u32; GROUPS],
     /// What it met, before all others so far.
@@ -31,29 +43,33 @@ struct Company<'a, 'm, Q: Together<'m>, A> {
     trusted: u32,
 }
 
-impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
+impl<'a, 'm, Q: Together<'m>, A: Record<Q::Answer>> Batch<'a, 'm, Q, A> {
     /// Traces rays that are alike, 16 for each of the [groups](GROUPS) at most.
     #[inline(always)]
-    pub(super) fn trace_together<S: Simd>(self, s: S, alike: Alike) {
-        let mut company = Company {
+    pub(super) fn trace_together<'r, S: Simd>(self, s: S, alike: Alike, room: &'r mut Room)
+    where
+        'a: 'r,
+    {
+        let Room { packet, sheared } = room;
+        let sound = packet.set(s, alike, self.rays);
+        let mut company = Company::<'r, 'm, Q, A> {
             leaves: Leaves::of(self.block),
-            packet: RayPacket::new(alike),
+            packet,
             met: [0; GROUPS],
             firsts: [Firsts::NONE; GROUPS],
             near: [[f32::INFINITY; 16]; GROUPS],
             trusted: if self.question.sees_all() { u32::MAX } else { 0 },
             batch: self,
         };
-        let sound = company.packet.set(s, company.batch.rays);
-        company.descend(s);
+        company.descend(s, sheared);
         company.settle(s, sound);
     }
 }
 
 impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
     #[inline(always)]
-    fn descend<S: Simd>(&mut self, s: S) {
-        let (mut columns, mut room) = (Columns::<ENOUGH_ROOM>::UNWRITTEN, [[[0.0; 16]; 2]; 16]);
+    fn descend<S: Simd>(&mut self, s: S, room: &mut Sheared) {
+        let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
         let mut walk = Walk::new(&mut columns, self.packet.highest(s));
         loop {
             let (hull, bound) = (self.packet.hull(s), Width::<16>::splat(s, walk.t_bound()));
@@ -70,7 +86,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             if walk.at() == ChildRef::NONE {
                 return;
             }
-            self.visit(s, walk.at().leaf_block(), &mut room);
+            self.visit(s, walk.at().leaf_block(), room);
             let bound = self.packet.highest(s);
             if bound == f32::NEG_INFINITY {
                 return;

@@ -88,7 +88,7 @@ impl Kernel for Gather<'_, '_> {
     fn run<S: Simd>(self, s: S) {
         let Gather { level, rays, stops } = self;
         let index = &level.index.parts();
-        let mut gatherer = Gatherer { level, index, found: Found::NONE };
+        let mut gatherer = Gatherer { level, index, found: Found::NONE, packet: None };
         let mut first = 0;
         while first < rays.len() {
             let (rays, stops) = (&rays[first..], &mut stops[first..]);
@@ -111,6 +111,7 @@ struct Gatherer<'a, 'm> {
     level: &'a Level<'m>,
     index: &'a Block<'m>,
     found: Found,
+    packet: Option<RayPacket>,
 }
 
 impl Gatherer<'_, '_> {
@@ -139,8 +140,8 @@ impl Gatherer<'_, '_> {
         if rays.iter().any(|ray| widening(self.level, ray) != 0.0) {
             return false;
         }
-        let mut packet = RayPacket::new(alike);
-        let sound = packet.set(s, rays);
+        let packet = self.packet.get_or_insert_with(|| RayPacket::new(alike));
+        let sound = packet.set(s, alike, rays);
         if !self.found.all(s, bundles, &packet.hull(s), packet.highest(s)) {
             return false;
         }

@@ -49,6 +49,11 @@ impl Abreast {
         far_shift: [[0.0; 16]; 3],
     };
 
+    /// Becomes no rays: none that enters anything.
+    pub fn clear(&mut self) {
+        (self.low, self.high) = ([f32::INFINITY; 16], [f32::NEG_INFINITY; 16]);
+    }
+
     /// Becomes these rays, one to 16, and more of the first in the other lanes. The lanes of those that can hit
     /// something.
     #[inline(always)]

@@ -32,8 +32,7 @@ pub(crate) struct Spread {
 }
 
 impl RayPacket {
-    /// Without rays.
-    #[inline(always)]
+    /// Without rays. It is some kilobytes large, which had better not be written anew for each packet.
     pub fn new(alike: Alike) -> Self {
         RayPacket {
             alike,
@@ -46,15 +45,19 @@ impl RayPacket {
         }
     }
 
-    /// Becomes these rays; for each group the lanes of those that can hit something.
+    /// Becomes these rays, whatever it was; for each group the lanes of those that can hit something.
     #[inline(always)]
-    pub fn set<S: Width<16>>(&mut self, s: S, rays: &[Ray]) -> [u32; GROUPS] {
+    pub fn set<S: Width<16>>(&mut self, s: S, alike: Alike, rays: &[Ray]) -> [u32; GROUPS] {
+        self.alike = alike;
         let mut sound = [0; GROUPS];
         let mut ends = Ends::none(s);
         let parts = self.groups.iter_mut().zip(rays.chunks(16)).zip(&mut sound);
         for ((group, rays), sound) in parts {
             *sound = group.set(s, &self.alike, rays);
             ends.take(s, group);
+        }
+        for group in self.groups.iter_mut().skip(rays.len().div_ceil(16)) {
+            group.clear();
         }
         for k in 0..3 {
             self.reciprocals[k] = ends_of(s, ends.reciprocals[k]);

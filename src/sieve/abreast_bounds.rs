@@ -48,7 +48,7 @@ fn packet_is_right(random: &mut Random, worst: &mut Worst) -> Result<u32, u32> {
         }
     }
     let (mut packet, mut room) = (RayPacket::new(alike), [[[0.0; 16]; 2]; 16]);
-    let [sound, ..] = packet.set(Scalar, &rays);
+    let [sound, ..] = packet.set(Scalar, alike, &rays);
     let (mut first, mut last) = (block.aabb.lower, block.aabb.upper);
     for k in 0..3 {
         if alike.backwards[k] {
