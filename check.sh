@@ -97,11 +97,12 @@ step_targets() { targets/run.sh short; }
 # Each of them.
 step_all_targets() { targets/run.sh all; }
 
-# Each fuzz target for ten seconds, from nothing; fuzz/README.md says how to run them for longer.
+# Each fuzz target for ten seconds, from nothing; fuzz/README.md says how to run them for longer. Without vector instructions,
+# which take minutes to compile with all that a fuzzer counts: tests/fuzz_cases.rs has the same checks with them.
 step_fuzz() (
     cd fuzz
     export RUSTC_BOOTSTRAP=1
-    released build --release
+    released build --release --config 'build.rustflags=["--cfg=raykern_portable"]'
     findings=$(mktemp -d)
     for target in mesh ray block; do
         echo "-- $target"
