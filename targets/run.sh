@@ -154,7 +154,8 @@ board() { # prefix, Rust target, board
     size "$1" "$small" queries rt_accel_open rt_intersect rt_occluded
     size "$1" "$small" watertight rt_accel_open rt_intersect_watertight rt_occluded_watertight
     size "$1" "$small" choices rt_accel_open rt_intersect_with rt_occluded_with
-    size "$1" "$small" build rt_build_bvh rt_bvh_needs -Wl,--defsym=raykern_could_panic=0
+    size "$1" "$small" build rt_build_bvh rt_bvh_needs
+    size "$1" "$small" build-and-queries rt_build_bvh rt_bvh_needs rt_accel_open rt_intersect rt_occluded
 }
 
 arm() { # Rust target, flags, machine

@@ -47,19 +47,15 @@ pub(crate) fn volumes(line: &Line, [a, b, c]: Triangle) -> [f64; 3] {
 
 /// See [`triangle::normal`]: each component within `1.001 UNIT` of the real one.
 pub(crate) fn normal([a, b, c]: Triangle) -> [f64; 3] {
-    let mut normal = [0.0; 3];
-    for (k, component) in normal.iter_mut().enumerate() {
-        let mut axis = [0.0; 3];
-        axis[k] = 1.0;
-        *component = ring(&axis, [&a, &b, &c]).approximate();
-    }
-    normal
+    AXES.map(|axis| ring(&axis, [&a, &b, &c]).approximate())
 }
+
+const AXES: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Whether the triangle has area.
 #[inline(never)]
-pub(crate) fn has_area(triangle: Triangle) -> bool {
-    normal(triangle).iter().any(|x| *x != 0.0)
+pub(crate) fn has_area([a, b, c]: Triangle) -> bool {
+    AXES.iter().any(|axis| ring(axis, [&a, &b, &c]).sign() != Ordering::Equal)
 }
 
 /// The `t` at which a line meets a plane, or a float.

@@ -15,13 +15,6 @@
         }                                     \
     } while (0)
 
-// Queries have no way to panic; builds still have, and must not take it.
-void raykern_could_panic(void);
-void raykern_could_panic(void) {
-    board_print("panicked\n");
-    board_exit(1);
-}
-
 // Two squares across z, of two triangles each, the second one twice as far, and a single triangle behind them.
 static const float vertices[] = {0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1, 0, 0, 2, 1, 0, 2, 0, 1, 2, 1, 1, 2, 0, 0, 3, 1, 0, 3, 0, 1, 3};
 static const uint32_t indices[] = {0, 1, 2, 3, 2, 1, 4, 5, 6, 7, 6, 5, 8, 9, 10};
