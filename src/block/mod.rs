@@ -131,16 +131,17 @@ impl Counts {
             isize::try_from(end).ok()?;
             usize::try_from(start).ok()
         };
+        let known = |is: bool, count: u32| if is { count } else { 0 };
         let offsets = Offsets {
             geometries: part(self.geometries, size_of::<Geometry>())?,
             prim_ids: part(self.prim_ids, size_of::<u32>())?,
-            grids: part(self.grids, size_of::<GridHead>())?,
+            grids: part(known(GRID, self.grids), size_of::<GridHead>())?,
             nodes: part(self.nodes, size_of::<BvhNode>())?,
-            bundles: part(self.bundle_lanes, LANE)?,
-            words: part(self.words, size_of::<u32>())?,
-            sphere_blocks: part(self.sphere_blocks, size_of::<SphereBlock>())?,
+            bundles: part(known(WIDE, self.bundle_lanes), LANE)?,
+            words: part(known(GRID, self.words), size_of::<u32>())?,
+            sphere_blocks: part(known(BALLS, self.sphere_blocks), size_of::<SphereBlock>())?,
             triangle_blocks: part(self.triangle_blocks, size_of::<TriangleBlock>())?,
-            runs: part(self.runs, size_of::<Run>())?,
+            runs: part(known(GRID, self.runs), size_of::<Run>())?,
             motions: part(self.motions, size_of::<Motion>())?,
             end: 0,
         };

@@ -107,6 +107,7 @@ pub(super) fn volume_error(line: &Line, triangle: [[f32; 3]; 3]) -> f64 {
 }
 
 /// Which part of the triangle the line meets: it does when all volumes that are not zero have one sign.
+#[cfg_attr(target_os = "none", inline(never))]
 fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Feature> {
     let volumes = exact::volumes(line, triangle);
     let met = volumes.iter().any(|v| *v < 0.0) != volumes.iter().any(|v| *v > 0.0);

@@ -96,16 +96,18 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
 fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
     let block = &block.parts();
     let reach = block.header.reach;
-    let Some(mut ray) = ray.prepare_any(reach) else { return Q::nothing() };
+    // Where it is: a copy would be another kind of call, and twice the room.
+    let mut prepared = ray.prepare_any(reach);
+    let Some(ray) = &mut prepared else { return Q::nothing() };
     let mut query = question.query(block, ray.t_max);
-    let slab = FrameSlab::new(&ray, reach);
+    let slab = FrameSlab::new(ray, reach);
     // Those who add up stacks do not see through pointers.
     let ended = match Q::Query::ORDERED {
-        _ if SMALL => trace(Scalar, block, &mut ray, &slab, &mut query),
-        true => trace_any(block, &mut ray, &slab, Erased::<true>(&mut query)),
-        false => trace_any(block, &mut ray, &slab, Erased::<false>(&mut query)),
+        _ if SMALL => trace(Scalar, block, ray, &slab, &mut query),
+        true => trace_any(block, ray, &slab, Erased::<true>(&mut query)),
+        false => trace_any(block, ray, &slab, Erased::<false>(&mut query)),
     };
-    Q::answer(block, &ray, &mut query, ended)
+    Q::answer(block, ray, &mut query, ended)
 }
 
 /// [`trace`] for queries of any type.
