@@ -304,6 +304,7 @@ impl<'s> Job<'s> {
             _ => Some(LevelPlan::new(scene, options, asked, own.census.bounds)?),
         };
         let sum = |own: usize, index: fn(&Plan) -> usize| match &level {
+            _ if !INSTANCES => Some(own),
             None => Some(own),
             Some(LevelPlan { index: plan, fixed, .. }) => {
                 own.checked_add(*fixed)?.checked_add(index(plan))
@@ -326,7 +327,8 @@ impl<'s> Job<'s> {
             return Err(BuildError::OutOfMemory { minimum });
         }
         let usable = memory.len().min(size);
-        self.run(storage::zeroed(&mut memory[..usable]))
+        let short = BuildError::OutOfMemory { minimum };
+        self.run(storage::zeroed(memory.get_mut(..usable).ok_or(short)?))
     }
 
     /// Builds into zero bytes, aligned and at least the minimum; returns the block.
@@ -336,17 +338,20 @@ impl<'s> Job<'s> {
         let caller = Caller::new(options.threads, options.progress);
         caller.done(0.0).ok_or(BuildError::Cancelled)?;
         // The index takes what it wants, as long as that leaves the least for the own primitives.
-        let kept = level.as_ref().map_or(0, |level| level.fixed + level.index.size);
-        let room = bytes.len().saturating_sub(kept).clamp(own.minimum, own.size).min(bytes.len());
+        let level = level.as_ref().filter(|_| INSTANCES);
+        let kept = level.map_or(0, |level| level.fixed + level.index.size);
+        let room = bytes.len().saturating_sub(kept).min(own.size).max(own.minimum).min(bytes.len());
         let room = room / ALIGNMENT * ALIGNMENT;
-        let built = own.run(scene, options, &caller, &mut bytes[..room]);
+        let short = BuildError::OutOfMemory { minimum };
+        let own_bytes = bytes.get_mut(..room).ok_or(short)?;
+        let built = own.run(scene, options, &caller, own_bytes);
         caller.done(1.0).ok_or(BuildError::Cancelled)?;
         let size = match level {
-            Some(level) if INSTANCES => level.run(options, built?, bytes),
-            _ => Some(built?),
+            Some(level) => level.run(options, built?, bytes),
+            None => Some(built?),
         };
         let block = size.and_then(|size| bytes.get_mut(..size));
-        let block = block.ok_or(BuildError::OutOfMemory { minimum })?;
+        let block = block.ok_or(short)?;
         if REFIT && own.census.refit {
             // The scene was checked and the block is whole, so this error does not arise.
             refit::finish(block, scene, &caller).ok_or(BuildError::TooLarge)?;

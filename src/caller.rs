@@ -6,6 +6,8 @@ use core::cell::Cell;
 use core::ops::Range;
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use crate::kinds::THREADS;
+
 /// The caller's threads, lent to a build.
 pub trait Threads: Sync {
     /// How many tasks may run at once. With one, nothing is lent.
@@ -52,40 +54,54 @@ impl<'a> Caller<'a> {
     /// The size of the parts into which `count` things are shared out: a multiple of `grain`, and large enough
     /// for [`PARTS`] to be all. It depends on the threads, so what is made of the parts must not depend on it.
     pub fn part_size(&self, count: usize, grain: usize) -> usize {
-        count.div_ceil(self.part_count()).next_multiple_of(grain).max(grain)
+        let (count, grain) = (count.div_ceil(self.part_count().max(1)), grain.max(1));
+        count.next_multiple_of(grain).max(grain)
     }
 
     /// A good number of parts for the threads there are, at most [`PARTS`].
     pub fn part_count(&self) -> usize {
-        self.threads.map_or(1, |threads| threads.worker_count().saturating_mul(4).min(PARTS))
+        self.threads().map_or(1, |threads| threads.worker_count().saturating_mul(4).min(PARTS))
     }
 
-    /// What `work` makes of each part of `0..count`, in order; at most [`PARTS`] of this size.
-    pub fn map_parts<T: Send>(
+    /// Gives `take` what `work` makes of each part of `0..count`, in order; at most [`PARTS`] of this size.
+    pub fn for_parts<T: Send>(
         &self,
         count: usize,
         size: usize,
         work: impl Fn(Range<usize>) -> T + Sync,
-    ) -> impl Iterator<Item = T> {
-        let mut parts = [const { None }; PARTS];
-        let starts = (0..count).step_by(size);
-        let used = starts.len();
-        for (part, start) in parts.iter_mut().zip(starts) {
-            *part = Some((start..count.min(start + size), None));
+        mut take: impl FnMut(T),
+    ) {
+        if self.threads().is_none() {
+            let mut start = 0;
+            while start < count {
+                let end = count.min(start + size);
+                take(work(start..end));
+                start = end;
+            }
+            return;
         }
-        self.for_each(&mut parts[..used], |part| {
+        let mut parts = [const { None }; PARTS];
+        for (i, part) in parts.iter_mut().enumerate().take(count.div_ceil(size.max(1))) {
+            *part = Some((i * size..count.min((i + 1) * size), None));
+        }
+        self.for_each(&mut parts, |part| {
             if let Some((range, made)) = part {
                 *made = Some(work(range.clone()));
             }
         });
-        parts.into_iter().flatten().filter_map(|(_, made)| made)
+        parts.into_iter().flatten().filter_map(|(_, made)| made).for_each(take);
+    }
+
+    /// The threads that are lent.
+    fn threads(&self) -> Option<&'a dyn Threads> {
+        self.threads.filter(|_| THREADS)
     }
 
     /// Calls `work` with each item: on the caller's threads, if there are any.
     ///
     /// Neither what is called nor its result depends on how many threads there are.
     pub fn for_each<T: Send>(&self, items: &mut [T], work: impl Fn(&mut T) + Sync) {
-        let Some(threads) = self.threads.filter(|_| items.len() > 1) else {
+        let Some(threads) = self.threads().filter(|_| items.len() > 1) else {
             return items.iter_mut().for_each(work);
         };
         for items in items.chunks_mut(Taken::MOST) {
@@ -192,11 +208,12 @@ mod tests {
         for caller in [Caller::new(None, None), Caller::new(Some(&Odd), None)] {
             for count in [0, 1, 9, 10, 1000, 100_003] {
                 let size = caller.part_size(count, 10);
-                let parts = caller.map_parts(count, size, |part| (part.start, part.end));
-                let end = parts.fold(0, |end, part| {
-                    assert!(part.0 == end && (part.1 - end == size || part.1 == count));
-                    part.1
-                });
+                let mut end = 0;
+                let take = |part: Range<usize>| {
+                    assert!(part.start == end && (part.len() == size || part.end == count));
+                    end = part.end;
+                };
+                caller.for_parts(count, size, |part| part, take);
                 assert_eq!(end, count);
             }
         }

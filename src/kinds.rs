@@ -10,7 +10,11 @@ pub(crate) const WIDE: bool = cfg!(feature = "wide");
 pub(crate) const GRID: bool = cfg!(feature = "grid");
 /// Spheres, and with them quadratic numbers.
 pub(crate) const SPHERES: bool = cfg!(feature = "spheres");
+/// What is packed as spheres: these, and the boxes of instances.
+pub(crate) const BALLS: bool = SPHERES || INSTANCES;
 /// Blocks with instances.
 pub(crate) const INSTANCES: bool = cfg!(feature = "instances");
 /// Blocks that can be refitted.
 pub(crate) const REFIT: bool = cfg!(feature = "refit");
+/// Builds on threads that the caller lends; without, all is done by the caller's own.
+pub(crate) const THREADS: bool = cfg!(feature = "threads");

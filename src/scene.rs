@@ -123,7 +123,8 @@ impl<'a> Mesh<'a> {
     }
 
     /// The vertices of triangle `i`, or `None` when it or one of its vertices does not exist.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline)]
     pub fn triangle(&self, i: usize) -> Option<[[f32; 3]; 3]> {
         let corner = |v: usize| self.vertices.get::<3>(v);
         let [a, b, c] = self.numbers(i)?;

@@ -66,12 +66,6 @@ pub(crate) fn view_mut<T: Plain>(
     Some(unsafe { core::slice::from_raw_parts_mut(part.as_mut_ptr().cast::<T>(), count) })
 }
 
-/// The bytes of a plain value.
-pub(crate) fn bytes_of<T: Plain>(value: &T) -> &[u8] {
-    // SAFETY: a plain type has no padding, so all of its bytes are initialised.
-    unsafe { core::slice::from_raw_parts(core::ptr::from_ref(value).cast(), size_of::<T>()) }
-}
-
 /// Has the system put finished bytes into large pages, where it can: rays visit them here and there, and with small
 /// pages many visits would wait for the table of pages.
 #[cfg(all(feature = "std", target_os = "linux", target_arch = "x86_64", not(miri)))]

@@ -22,6 +22,7 @@ m4f        arm   thumbv7em-none-eabihf           -mcpu=cortex-m4,-mfloat-abi=har
 m7         arm   thumbv7em-none-eabihf           -mcpu=cortex-m7,-mfloat-abi=hard,-mfpu=fpv5-sp-d16   mps2-an500
 rv32imac   riscv riscv32imac-unknown-none-elf    -march=rv32imac,-mabi=ilp32                          virt
 rv32imafc  riscv riscv32imafc-unknown-none-elf   -march=rv32imafc,-mabi=ilp32f                        virt
+x86_64     bare  x86_64-unknown-linux-gnu        gcc                                                  -
 i686       user  i686-unknown-linux-gnu          i686-linux-gnu-gcc                                   -
 armv7      user  armv7-unknown-linux-gnueabihf   arm-linux-gnueabihf-gcc                              qemu-arm
 aarch64    user  aarch64-unknown-linux-gnu       aarch64-linux-gnu-gcc                                qemu-aarch64
@@ -124,8 +125,8 @@ board_memory() { # program
     rv*) defsym __flash=0x80000000 __flash_size=0x100000 __ram=0x80100000 __ram_size=0x20000 ;;
     m0)
         defsym __flash=0 __flash_size=0x40000 __ram=0x20000000 __ram_size=0x4000
-        # Builds take more stack than it has; another board runs the same instructions.
-        [ "$1" != core ] || { emulator=(qemu-system-arm -M mps2-an385) && defsym "${large[@]}"; }
+        # Others take more memory than it has; another board runs the same instructions.
+        [ "$1" = picture ] || { emulator=(qemu-system-arm -M mps2-an385) && defsym "${large[@]}"; }
         ;;
     *) defsym "${large[@]}" ;;
     esac
@@ -139,12 +140,15 @@ run_board() { # image, what it printed goes to
 }
 
 board() { # prefix, Rust target, board
-    local small printed=$work/$name.txt image
-    local part what number
+    local small kinds printed=$work/$name.txt image
+    local part what number archive
     small=$(library "$2" "")
-    for part in picture core; do
+    kinds=$(library "$2" spheres,instances freestanding)
+    for part in picture core kinds; do
         board_memory "$part"
-        image=$(program "$1" "$small" "$3" "$part")
+        archive=$small
+        [ "$part" != kinds ] || archive=$kinds
+        image=$(program "$1" "$archive" "$3" "$part")
         run_board "$image" "$printed" || { cat "$printed" >&2; return 1; }
         same "$part.txt" "$printed"
         while read -r _ what number; do
@@ -154,7 +158,8 @@ board() { # prefix, Rust target, board
     size "$1" "$small" queries rt_accel_open rt_intersect rt_occluded
     size "$1" "$small" watertight rt_accel_open rt_intersect_watertight rt_occluded_watertight
     size "$1" "$small" choices rt_accel_open rt_intersect_with rt_occluded_with
-    size "$1" "$small" build rt_build_bvh rt_bvh_needs -Wl,--defsym=raykern_could_panic=0
+    size "$1" "$small" build rt_build_bvh rt_bvh_needs
+    size "$1" "$small" build-and-queries rt_build_bvh rt_bvh_needs rt_accel_open rt_intersect rt_occluded
 }
 
 arm() { # Rust target, flags, machine
@@ -180,6 +185,18 @@ riscv() {
     read -r -a flags <<<"${2//,/ }"
     emulator=(qemu-system-riscv32 -M "$3" -bios none)
     board riscv64-unknown-elf- "$1" riscv
+}
+
+# No libc, no libm, no start-up files, and nothing left to look up. On another processor than this there is nothing to run.
+bare() { # Rust target, C compiler
+    [ "$(uname -m)" = "$name" ] || return 0
+    install "$2" gcc
+    local image=$work/$name.elf small
+    small=$(library "$1" "" freestanding)
+    "$2" -std=c11 -Os -ffreestanding -fno-builtin -fno-stack-protector -nostdlib -nostartfiles -static -no-pie \
+        -Wall -Wextra -Werror -Wl,--gc-sections -I ../include ../c_tests/freestanding.c "$small" -o "$image"
+    "$image"
+    cost text "$(command size "$image" | awk 'NR == 2 { print $1 }')"
 }
 
 user() { # Rust target, C compiler, emulator

@@ -12,7 +12,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("storage", &[]),
     ("simd", &["math"]),
-    ("caller", &[]),
+    ("caller", &["kinds"]),
     ("exact", &["kinds", "math"]),
     ("ray", &["exact", "math", "simd"]),
     ("block", &["error", "kinds", "math", "storage"]),
@@ -76,8 +76,8 @@ const HOUSE: &[(&str, &[&str])] = &[
     (
         "capi",
         &[
-            "accel", "build", "caller", "closest", "error", "grid", "hits", "query", "ray",
-            "refit", "scene", "storage", "surface",
+            "accel", "build", "caller", "closest", "error", "grid", "hits", "kinds", "query",
+            "ray", "refit", "scene", "storage", "surface",
         ],
     ),
 ];

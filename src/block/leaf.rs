@@ -84,7 +84,7 @@ impl TriangleBlock {
     /// Writes vertex number `v` for corner `k` of triangle `i`.
     pub fn set_corner(&mut self, i: usize, k: usize, v: usize) {
         let (byte, shift) = nibble(i);
-        let byte = &mut self.corners[k][byte];
+        let byte = &mut self.corners[k % 3][byte];
         *byte = (*byte & !(15 << shift)) | ((v as u8 & 15) << shift);
     }
 }
@@ -137,6 +137,12 @@ impl SphereBlock {
     pub fn sphere(&self, i: usize) -> ([f32; 3], f32) {
         let i = i % SPHERES;
         ([self.x[i], self.y[i], self.z[i]], self.radius[i])
+    }
+
+    /// Writes sphere `i < 15`.
+    pub fn set_sphere(&mut self, i: usize, [x, y, z]: [f32; 3], radius: f32) {
+        let i = i % SPHERES;
+        (self.x[i], self.y[i], self.z[i], self.radius[i]) = (x, y, z, radius);
     }
 
     /// The lanes that can be hit, one bit each.

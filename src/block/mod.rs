@@ -29,6 +29,7 @@ use bundle::LANE;
 use cells::{GridHead, Run};
 use leaf::{SphereBlock, TriangleBlock};
 
+use crate::kinds::{BALLS, GRID, REFIT, WIDE};
 use crate::math::Aabb;
 use crate::storage::{self, ALIGNMENT, Plain, align_up};
 
@@ -130,16 +131,17 @@ impl Counts {
             isize::try_from(end).ok()?;
             usize::try_from(start).ok()
         };
+        let known = |is: bool, count: u32| if is { count } else { 0 };
         let offsets = Offsets {
             geometries: part(self.geometries, size_of::<Geometry>())?,
             prim_ids: part(self.prim_ids, size_of::<u32>())?,
-            grids: part(self.grids, size_of::<GridHead>())?,
+            grids: part(known(GRID, self.grids), size_of::<GridHead>())?,
             nodes: part(self.nodes, size_of::<BvhNode>())?,
-            bundles: part(self.bundle_lanes, LANE)?,
-            words: part(self.words, size_of::<u32>())?,
-            sphere_blocks: part(self.sphere_blocks, size_of::<SphereBlock>())?,
+            bundles: part(known(WIDE, self.bundle_lanes), LANE)?,
+            words: part(known(GRID, self.words), size_of::<u32>())?,
+            sphere_blocks: part(known(BALLS, self.sphere_blocks), size_of::<SphereBlock>())?,
             triangle_blocks: part(self.triangle_blocks, size_of::<TriangleBlock>())?,
-            runs: part(self.runs, size_of::<Run>())?,
+            runs: part(known(GRID, self.runs), size_of::<Run>())?,
             motions: part(self.motions, size_of::<Motion>())?,
             end: 0,
         };
@@ -171,16 +173,16 @@ impl Counts {
         let (_, rest) = bytes.split_at_mut_checked(at.geometries)?;
         let (geometries, rest) = part(rest, self.geometries, at.prim_ids - at.geometries)?;
         let (prim_ids, rest) = part(rest, self.prim_ids, at.grids - at.prim_ids)?;
-        let (grids, rest) = part(rest, self.grids, at.nodes - at.grids)?;
+        let (grids, rest) = part_if(GRID, rest, self.grids, at.nodes - at.grids)?;
         let (nodes, rest) = part(rest, self.nodes, at.bundles - at.nodes)?;
         let (bundles, rest) = rest.split_at_mut_checked(at.words - at.bundles)?;
-        let (words, rest) = part(rest, self.words, at.sphere_blocks - at.words)?;
+        let (words, rest) = part_if(GRID, rest, self.words, at.sphere_blocks - at.words)?;
         let spheres = at.triangle_blocks - at.sphere_blocks;
-        let (sphere_blocks, rest) = part(rest, self.sphere_blocks, spheres)?;
+        let (sphere_blocks, rest) = part_if(BALLS, rest, self.sphere_blocks, spheres)?;
         let triangles = at.runs - at.triangle_blocks;
         let (triangle_blocks, rest) = part(rest, self.triangle_blocks, triangles)?;
-        let (runs, rest) = part(rest, self.runs, at.motions - at.runs)?;
-        let (motions, rest) = part(rest, self.motions, at.end - at.motions)?;
+        let (runs, rest) = part_if(GRID, rest, self.runs, at.motions - at.runs)?;
+        let (motions, rest) = part_if(REFIT, rest, self.motions, at.end - at.motions)?;
         Some(PartsMut {
             geometries,
             prim_ids,
@@ -200,25 +202,27 @@ impl Counts {
     /// size.
     pub fn seal(&self, kind: u32, layout: u32, census: &Census, bytes: &mut [u8]) -> Option<usize> {
         let at = self.offsets()?;
-        let parts = [
-            (at.geometries, self.geometries as usize * size_of::<Geometry>()),
-            (at.prim_ids, self.prim_ids as usize * size_of::<u32>()),
-            (at.grids, self.grids as usize * size_of::<GridHead>()),
-            (at.nodes, self.nodes as usize * size_of::<BvhNode>()),
-            (at.bundles, self.bundle_lanes as usize * LANE),
-            (at.words, self.words as usize * size_of::<u32>()),
-            (at.sphere_blocks, self.sphere_blocks as usize * size_of::<SphereBlock>()),
-            (at.triangle_blocks, self.triangle_blocks as usize * size_of::<TriangleBlock>()),
-            (at.runs, self.runs as usize * size_of::<Run>()),
-            (at.motions, self.motions as usize * size_of::<Motion>()),
-        ];
-        for (start, size) in parts {
-            let end = start + size;
-            let next = storage::align_up(end as u64)? as usize;
-            bytes.get_mut(end..next)?.fill(0);
+        let mut fill = |start, count, size| end_part(bytes, start, count, size);
+        fill(at.geometries, self.geometries, size_of::<Geometry>())?;
+        fill(at.prim_ids, self.prim_ids, size_of::<u32>())?;
+        fill(at.nodes, self.nodes, size_of::<BvhNode>())?;
+        fill(at.triangle_blocks, self.triangle_blocks, size_of::<TriangleBlock>())?;
+        if WIDE {
+            fill(at.bundles, self.bundle_lanes, LANE)?;
+        }
+        if BALLS {
+            fill(at.sphere_blocks, self.sphere_blocks, size_of::<SphereBlock>())?;
+        }
+        if GRID {
+            fill(at.grids, self.grids, size_of::<GridHead>())?;
+            fill(at.words, self.words, size_of::<u32>())?;
+            fill(at.runs, self.runs, size_of::<Run>())?;
+        }
+        if REFIT {
+            fill(at.motions, self.motions, size_of::<Motion>())?;
         }
         let header = Header::new(kind, layout, census, *self, at.end);
-        bytes.get_mut(..size_of::<Header>())?.copy_from_slice(storage::bytes_of(&header));
+        *storage::view_mut::<Header>(bytes, 0, 1)?.first_mut()? = header;
         Some(at.end)
     }
 }
@@ -238,10 +242,30 @@ pub(crate) fn seal_packed(bytes: &mut [u8], size: usize) -> Option<()> {
     Some(())
 }
 
+/// Fills what lies behind `count` things of `size` bytes, up to the next part, with zeros.
+#[inline(never)]
+fn end_part(bytes: &mut [u8], start: usize, count: u32, size: usize) -> Option<()> {
+    let end = start + count as usize * size;
+    let next = storage::align_up(end as u64)? as usize;
+    bytes.get_mut(end..next)?.fill(0);
+    Some(())
+}
+
 /// `count` elements at the front of `bytes`, and what follows after `size` bytes.
 fn part<T: Plain>(bytes: &mut [u8], count: u32, size: usize) -> Option<(&mut [T], &mut [u8])> {
     let (part, rest) = bytes.split_at_mut_checked(size)?;
     Some((storage::view_mut(part, 0, count as usize)?, rest))
+}
+
+/// The same for parts of a kind that this build may not know: it then makes none.
+#[inline(always)]
+fn part_if<T: Plain>(
+    known: bool,
+    bytes: &mut [u8],
+    count: u32,
+    size: usize,
+) -> Option<(&mut [T], &mut [u8])> {
+    if known { part(bytes, count, size) } else { Some((&mut [], bytes)) }
 }
 
 /// What the header says of the scene, apart from sizes.

@@ -10,7 +10,7 @@ use super::{
     BYTE_ORDER, BvhNode, Counts, Header, KIND_GRID, LAYOUT_COMPACT, MAGIC, Motion, VERSION,
 };
 use crate::error::OpenError;
-use crate::kinds::{GRID, INSTANCES, SPHERES, WIDE};
+use crate::kinds::{BALLS, GRID, INSTANCES, WIDE};
 use crate::storage::{self, ALIGNMENT};
 
 /// A block as typed slices.
@@ -59,7 +59,7 @@ impl<'m> Finished<'m> {
     /// that what belongs to them is there.
     pub fn split(bytes: &'m [u8]) -> Result<Self, OpenError> {
         let (header, end) = front(bytes)?;
-        let has_level = header.level != 0;
+        let has_level = INSTANCES && header.level != 0;
         let ends = match has_level {
             true => u64::from(header.level) * ALIGNMENT as u64 == end as u64,
             false => header.size == end as u64,
@@ -130,10 +130,14 @@ impl<'m> Finished<'m> {
             let header: &'m Header = &*block.cast();
             let Counts { geometries, prim_ids, grids, nodes, bundle_lanes, .. } = header.counts;
             let Counts { words, sphere_blocks, triangle_blocks, runs, .. } = header.counts;
+            // What this build does not know no block has that it opens.
+            let [grids, words, runs] = [grids, words, runs].map(|n| if GRID { n } else { 0 });
+            let sphere_blocks = if BALLS { sphere_blocks } else { 0 };
             let mut at = At { block, offset: size_of::<Header>() };
             let (geometries, prim_ids) = (at.part(geometries), at.part(prim_ids));
             let (grids, nodes) = (at.part(grids), at.part(nodes));
             let bundles = match header.layout {
+                _ if !WIDE => Bundles::None,
                 4 => Bundles::Four(at.part(bundle_lanes / 4)),
                 8 => Bundles::Eight(at.part(bundle_lanes / 8)),
                 16 => Bundles::Sixteen(at.part(bundle_lanes / 16)),
@@ -164,10 +168,11 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
         return Err(OpenError::Misaligned);
     }
     let Some(header) = storage::view::<Header>(bytes, 0, 1).and_then(<[_]>::first) else {
-        let begins_right = MAGIC.starts_with(bytes.get(..8).unwrap_or(bytes));
+        let begins_right = bytes.iter().zip(MAGIC).all(|(byte, letter)| *byte == letter);
         return Err(if begins_right { OpenError::Truncated } else { OpenError::NotABlock });
     };
-    if header.magic != MAGIC {
+    // As numbers: else it would be a call.
+    if u64::from_ne_bytes(header.magic) != u64::from_ne_bytes(MAGIC) {
         return Err(OpenError::NotABlock);
     }
     if header.byte_order == BYTE_ORDER.swap_bytes() {
@@ -185,7 +190,7 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
     let counts = &header.counts;
     let width = if header.layout == LAYOUT_COMPACT { u32::MAX } else { header.layout };
     let end = counts.offsets().ok_or(OpenError::Corrupt)?.end;
-    if counts.bundle_lanes % width != 0 || counts.motions > 1 {
+    if (WIDE && counts.bundle_lanes % width.max(1) != 0) || counts.motions > 1 {
         return Err(OpenError::Corrupt);
     }
     Ok((header, end))
@@ -193,10 +198,13 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
 
 /// Whether this build of the library reads what is in a block.
 fn is_known(header: &Header) -> bool {
+    let Counts { grids, words, runs, bundle_lanes, sphere_blocks, .. } = header.counts;
     (WIDE || header.layout == LAYOUT_COMPACT)
         && (GRID || header.kind != KIND_GRID)
+        && (GRID || grids | words | runs == 0)
+        && (WIDE || bundle_lanes == 0)
         // The index over instances holds their boxes as if they were spheres.
-        && (SPHERES || INSTANCES || header.counts.sphere_blocks == 0)
+        && (BALLS || sphere_blocks == 0)
         && (INSTANCES || header.level == 0)
 }
 

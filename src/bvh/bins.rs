@@ -2,6 +2,7 @@
 
 use super::refs::PrimRef;
 use super::split::{Areas, Box4, centre, greater, lesser, middle};
+use crate::simd::SMALL;
 
 /// Bins along each axis at most.
 const BINS: usize = 32;
@@ -59,7 +60,10 @@ impl Binning {
     fn new(centres: &Box4, count: usize, most: usize) -> Self {
         // Few refs leave most bins empty.
         let bins = (4 + count / 8).min(most);
-        let scale = core::array::from_fn(|k| bins as f32 / (centres.upper[k] - centres.lower[k]));
+        let mut scale = [0.0; 4];
+        for k in 0..4 {
+            scale[k] = bins as f32 / (centres.upper[k] - centres.lower[k]);
+        }
         Binning { lower: centres.lower, scale, bins, last: (bins - 1) as f32 }
     }
 
@@ -71,7 +75,15 @@ impl Binning {
         for k in 0..4 {
             at[k] = self.place(centre[k], k);
         }
-        [0, 1, 2].map(|k| at[k].to_bits() as usize % BINS)
+        let [x, y, z, _] = at.map(|at| at.to_bits() as usize % BINS);
+        [x, y, z]
+    }
+
+    /// The bin on one axis.
+    #[inline(always)]
+    fn bin_of(&self, r: &PrimRef, k: usize) -> usize {
+        let (k, Box4 { lower, upper }) = (k % 3, &r.bounds);
+        self.place(middle(lower[k], upper[k]), k).to_bits() as usize % BINS
     }
 
     /// The bin on axis `k`, above [`INTEGER`]. NaN, from infinite boxes or an axis without extent, goes to bin 0:
@@ -99,17 +111,24 @@ impl Plane {
         let (mut count, k) = (0, self.axis % 3);
         let right = self.bin as f32 + INTEGER;
         for i in 0..refs.len() {
-            let Box4 { lower, upper } = &refs[i].bounds;
+            let (before, from) = refs.split_at_mut(i);
+            let Some(r) = from.first_mut() else { break };
+            let Box4 { lower, upper } = &r.bounds;
             let left = self.binning.place(middle(lower[k], upper[k]), k) < right;
-            refs.swap(i, count);
+            // None when all so far are left.
+            if let Some(place) = before.get_mut(count) {
+                core::mem::swap(place, r);
+            }
             count += usize::from(left);
         }
         count
     }
 }
 
-/// The bins of the three axes: scratch for [`best_plane`].
-pub(crate) struct Bins([Axis; 3]);
+/// The bins of the three axes, or of one after the other where room is scarce: scratch for [`best_plane`].
+pub(crate) struct Bins([Axis; AXES]);
+
+const AXES: usize = if SMALL { 1 } else { 3 };
 
 struct Axis {
     bounds: [Box4; BINS],
@@ -117,8 +136,9 @@ struct Axis {
 }
 
 impl Bins {
-    pub const EMPTY: Bins =
-        Bins([const { Axis { bounds: [Box4::EMPTY; BINS], counts: [0; BINS] } }; 3]);
+    /// All zero, as that takes no room in a program; [`best_plane`] clears what it uses.
+    pub const UNUSED: Bins =
+        Bins([const { Axis { bounds: [Box4::ZERO; BINS], counts: [0; BINS] } }; AXES]);
 }
 
 /// The best split by bins of the box around the centres, or `None` when all fall into one.
@@ -132,31 +152,21 @@ pub(crate) fn best_plane(
     Bins(axes): &mut Bins,
 ) -> Option<Plane> {
     let binning = Binning::new(centres, refs.len(), effort.bins);
+    // All of them, if they are less than twice as many as samples.
+    let step = refs.len() / effort.samples.max(1);
+    let sample = refs.iter().step_by(step.max(1));
     let first = if effort.one_axis { centres.widest() } else { 0 };
     let looked_at = if effort.one_axis { first..first + 1 } else { 0..3 };
-    for axis in &mut axes[looked_at.clone()] {
-        axis.bounds[..binning.bins].fill(Box4::EMPTY);
-        axis.counts[..binning.bins].fill(0);
-    }
-    let all = refs.len() < 2 * effort.samples;
-    let step = if all { 1 } else { refs.len() / effort.samples };
-    let sample = refs.iter().step_by(step);
-    if effort.one_axis {
-        for r in sample {
-            axes[first].add(r, binning.bins_of(r)[first]);
-        }
-    } else {
-        let [x, y, z] = axes;
-        for r in sample {
-            let [a, b, c] = binning.bins_of(r);
-            x.add(r, a);
-            y.add(r, b);
-            z.add(r, c);
-        }
+    if !(SMALL || effort.one_axis) {
+        fill(axes, &binning, sample.clone());
     }
     let mut best = (f32::INFINITY, 0, 0);
     for k in looked_at {
-        let (work, bin) = axes[k].best(binning.bins, areas);
+        let Some(axis) = axes.get_mut(k % AXES) else { break };
+        if SMALL || effort.one_axis {
+            axis.fill(&binning, k, sample.clone());
+        }
+        let (work, bin) = axis.best(binning.bins, areas);
         if work < best.0 {
             best = (work, k, bin);
         }
@@ -168,15 +178,45 @@ pub(crate) fn best_plane(
     Some(Plane { binning, axis, bin })
 }
 
+/// Fills the bins of three axes at once.
+#[inline]
+fn fill<'r>(axes: &mut [Axis], binning: &Binning, sample: impl Iterator<Item = &'r PrimRef>) {
+    let Some([x, y, z]) = axes.first_chunk_mut() else { return };
+    for axis in [&mut *x, &mut *y, &mut *z] {
+        axis.clear(binning.bins);
+    }
+    for r in sample {
+        let [a, b, c] = binning.bins_of(r);
+        x.add(r, a);
+        y.add(r, b);
+        z.add(r, c);
+    }
+}
+
 impl Axis {
+    fn clear(&mut self, bins: usize) {
+        self.bounds.iter_mut().take(bins).for_each(|bounds| *bounds = Box4::EMPTY);
+        self.counts.iter_mut().take(bins).for_each(|count| *count = 0);
+    }
+
+    /// Fills the bins of axis `k`.
+    #[inline]
+    fn fill<'r>(&mut self, binning: &Binning, k: usize, sample: impl Iterator<Item = &'r PrimRef>) {
+        self.clear(binning.bins);
+        for r in sample {
+            self.add(r, binning.bin_of(r, k));
+        }
+    }
+
     #[inline(always)]
     fn add(&mut self, r: &PrimRef, bin: usize) {
-        self.bounds[bin].add(&r.bounds);
-        self.counts[bin] += 1;
+        self.bounds[bin % BINS].add(&r.bounds);
+        self.counts[bin % BINS] += 1;
     }
 
     /// The least work of a split, and the first bin on its right; 0 when there is none.
     fn best(&self, bins: usize, areas: Areas) -> (f32, usize) {
+        let bins = bins.min(BINS);
         let (bounds, counts) = (&self.bounds[..bins], &self.counts[..bins]);
         // What lies right of each plane, from the right; then what lies left.
         let mut right = [(0.0f32, 0u32); BINS];

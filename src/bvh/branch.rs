@@ -1,11 +1,15 @@
 //! The tree as branches that grow independently, on any number of threads.
 
+use core::ops::Range;
+
 use super::MAX_DEPTH;
 use super::refs::PrimRef;
 use super::split::{Areas, Extent};
-use super::tree::{Grown, Limits, Splitter, Task};
+use super::task::{Known, Task};
+use super::tree::{Grown, Limits, Splitter};
 use crate::block::BvhNode;
 use crate::caller::{Caller, PARTS};
+use crate::kinds::{THREADS, WIDE};
 use crate::math::Aabb;
 use crate::prim::GRAIN;
 
@@ -38,38 +42,73 @@ pub(crate) fn grow(
     limits: &Limits,
     caller: &Caller,
 ) -> Option<Size> {
-    let extent = whole(slots.get(..count)?, caller);
+    let extent = whole(slots.get(..count)?, caller)?;
     let bounds = extent.bounds.aabb();
     let areas = Areas::new(&bounds);
     let splitter = Splitter { limits, areas, whole: areas.of(&bounds) };
     let room = if limits.source.is_some() { slots.len() } else { count };
     let budget = limits.leaves;
-    let root = Task { node: 0, pairs: 2, first: 0, count, room, depth: 0, budget, extent };
-    let mut tasks = [root; BRANCHES];
-    let count = splitter.branch_out(nodes, slots, &mut tasks, caller)?;
-    let tasks = &tasks[..count];
-    let mut branches: [Option<Branch>; BRANCHES] = [const { None }; BRANCHES];
-    let (mut free_nodes, mut at_node) = (&mut *nodes, 0);
-    for ((task, refs), branch) in tasks.iter().zip(places(tasks, slots)).zip(&mut branches) {
-        let (first, room) = (task.pairs as usize, 2 * (task.budget - 1));
-        let rest = core::mem::take(&mut free_nodes).split_at_mut_checked(first - at_node)?.1;
-        let (nodes, rest) = rest.split_at_mut_checked(room)?;
-        (free_nodes, at_node) = (rest, first + room);
-        *branch = Some(Branch { task: *task, nodes, refs, root: None });
-    }
-    caller.for_each(&mut branches[..count], |branch| {
-        if let Some(branch) = branch {
-            branch.root = splitter.grow_branch(branch);
-        }
-    });
-    let mut roots = [BvhNode::inner(&Aabb::EMPTY, 0); BRANCHES];
-    for (root, branch) in roots.iter_mut().zip(branches.iter().flatten()) {
-        *root = branch.root?;
-    }
-    for (task, root) in tasks.iter().zip(roots) {
-        *nodes.get_mut(task.node as usize)? = root;
+    let root = Task {
+        node: 0,
+        pairs: 2,
+        first: 0,
+        count,
+        room,
+        depth: 0,
+        budget,
+        known: Known::of(extent),
+    };
+    if THREADS {
+        splitter.grow_apart(root, nodes, slots, caller)?;
+    } else {
+        splitter.grow_at_once(root, nodes, slots)?;
     }
     close_gaps(nodes, slots)
+}
+
+impl Splitter<'_, '_, '_> {
+    /// Grows the tree by branches that need not wait for each other.
+    fn grow_apart(
+        self,
+        root: Task,
+        nodes: &mut [BvhNode],
+        slots: &mut [PrimRef],
+        caller: &Caller,
+    ) -> Option<()> {
+        let mut tasks = [root; BRANCHES];
+        let count = self.branch_out(nodes, slots, &mut tasks, caller)?;
+        let tasks = &tasks[..count];
+        let mut branches: [Option<Branch>; BRANCHES] = [const { None }; BRANCHES];
+        let (mut free_nodes, mut at_node) = (&mut *nodes, 0);
+        for ((task, refs), branch) in tasks.iter().zip(places(tasks, slots)).zip(&mut branches) {
+            let (first, room) = (task.pairs as usize, 2 * (task.budget - 1));
+            let rest = core::mem::take(&mut free_nodes).split_at_mut_checked(first - at_node)?.1;
+            let (nodes, rest) = rest.split_at_mut_checked(room)?;
+            (free_nodes, at_node) = (rest, first + room);
+            *branch = Some(Branch { task: *task, nodes, refs, root: None });
+        }
+        caller.for_each(&mut branches[..count], |branch| {
+            if let Some(branch) = branch {
+                branch.root = self.grow_branch(branch);
+            }
+        });
+        let mut roots = [BvhNode::inner(&Aabb::EMPTY, 0); BRANCHES];
+        for (root, branch) in roots.iter_mut().zip(branches.iter().flatten()) {
+            *root = branch.root?;
+        }
+        for (task, root) in tasks.iter().zip(roots) {
+            *nodes.get_mut(task.node as usize)? = root;
+        }
+        Some(())
+    }
+
+    /// Grows the same tree as one branch.
+    fn grow_at_once(self, task: Task, nodes: &mut [BvhNode], refs: &mut [PrimRef]) -> Option<()> {
+        let (root, nodes) = nodes.split_at_mut_checked(task.pairs as usize)?;
+        let mut branch = Branch { task, nodes, refs, root: None };
+        *root.first_mut()? = self.grow_branch(&mut branch)?;
+        Some(())
+    }
 }
 
 /// Branches at most. How many there are must not depend on the threads, as the tree must not.
@@ -107,27 +146,33 @@ impl Splitter<'_, '_, '_> {
             }
             caller.for_each(&mut jobs[..count], |job| {
                 if let Some((task, slots, children)) = job {
-                    let split = self.part(slots, task, &mut self.scratch());
-                    *children = split.and_then(|split| task.children(&split, task.pairs, slots));
+                    *children = self.children(task, slots);
                 }
             });
             let olds = *tasks;
             let olds_and_jobs = olds.iter().zip(&jobs).take(count);
             count = 0;
             for (task, job) in olds_and_jobs {
-                let Some((_, _, children)) = job else {
+                let Some((_, _, parted)) = job else {
                     tasks[count] = *task;
                     count += 1;
                     continue;
                 };
                 // More than a leaf, so it is split.
-                let node = nodes.get_mut(task.node as usize)?;
-                *node = BvhNode::inner(&task.extent.bounds.aabb(), task.pairs);
-                tasks[count..count + 2].copy_from_slice(children.as_ref()?);
+                let (aabb, children) = parted.as_ref()?;
+                *nodes.get_mut(task.node as usize)? = BvhNode::inner(aabb, task.pairs);
+                tasks[count..count + 2].copy_from_slice(children);
                 count += 2;
             }
         }
         Some(count)
+    }
+
+    /// The box around what a task splits, and what it is split into.
+    fn children(self, task: &Task, slots: &mut [PrimRef]) -> Option<(Aabb, [Task; 2])> {
+        let extent = task.known.extent(slots.get(..task.count)?);
+        let split = self.part(slots, task, &extent, &mut self.scratch())?;
+        Some((extent.bounds.aabb(), task.children(&split, task.pairs, slots)?))
     }
 
     /// Tasks with more refs than this are to be split: the least number, from `grain` on, for which there is room;
@@ -154,27 +199,34 @@ fn places<'r>(tasks: &[Task], slots: &'r mut [PrimRef]) -> impl Iterator<Item = 
 }
 
 /// The box around all refs, and around their centres.
-fn whole(refs: &[PrimRef], caller: &Caller) -> Extent {
-    let mut extent = Extent::EMPTY;
-    for part in caller.map_parts(refs.len(), part_size(refs), |part| Extent::around(&refs[part])) {
-        extent.bounds.add(&part.bounds);
-        extent.centres.add(&part.centres);
+fn whole(refs: &[PrimRef], caller: &Caller) -> Option<Extent> {
+    if !THREADS {
+        return Some(Extent::around(refs));
     }
+    let mut extent = Some(Extent::EMPTY);
+    let around = |part| refs.get(part).map(Extent::around);
+    caller.for_parts(refs.len(), part_size(refs), around, |part| {
+        extent = extent.zip(part).map(|(extent, part)| extent.with(&part));
+    });
     extent
 }
 
 /// How unlike the areas of refs are: 1 where all are alike, about `n / k` where `k` of `n` have most of the area.
 pub(super) fn unevenness(refs: &[PrimRef], areas: Areas, caller: &Caller) -> f64 {
-    let parts = caller.map_parts(refs.len(), part_size(refs), |part| {
+    let sums = |part: Range<usize>| {
         let (mut sum, mut squares) = (0.0, 0.0);
-        for r in &refs[part] {
+        for r in refs.get(part).unwrap_or_default() {
             let area = f64::from(areas.of_finite(&r.bounds));
             sum += area;
             squares += area * area;
         }
         (sum, squares)
+    };
+    let (mut sum, mut squares) = (0.0, 0.0);
+    caller.for_parts(refs.len(), part_size(refs), sums, |part| {
+        sum += part.0;
+        squares += part.1;
     });
-    let (sum, squares) = parts.fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
     squares * refs.len() as f64 / (sum * sum)
 }
 
@@ -192,7 +244,8 @@ fn close_gaps(nodes: &mut [BvhNode], slots: &mut [PrimRef]) -> Option<Size> {
         let node = nodes.get_mut(at as usize)?;
         if node.is_leaf() {
             let (first, count) = (node.first as usize, Grown::ref_count(node));
-            if first != size.refs {
+            // Slots stay free only where refs may be cut.
+            if WIDE && first != size.refs {
                 slots.get(first..first + count)?;
                 slots.copy_within(first..first + count, size.refs);
             }
@@ -203,16 +256,57 @@ fn close_gaps(nodes: &mut [BvhNode], slots: &mut [PrimRef]) -> Option<Size> {
                 return Some(size);
             }
             pending -= 1;
-            at = stack[pending];
+            at = *stack.get(pending)?;
             continue;
         }
         let (pair, place) = (node.first as usize, size.nodes);
         node.first = place as u32;
         // Pairs lie in the order of this walk, so the place is this pair's own, or one moved before.
-        nodes.copy_within(pair..pair + 2, place);
+        if THREADS {
+            nodes.copy_within(pair..pair + 2, place);
+        }
         at = place as u32;
         *stack.get_mut(pending)? = at + 1;
         pending += 1;
         size.nodes += 2;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::bins::Effort;
+    use crate::bvh::budget::leaf_budget;
+    use crate::bvh::tree::tests::series;
+    use std::vec::Vec;
+
+    #[test]
+    fn branches_are_those_of_a_tree_that_grows_at_once() {
+        let count = 20_000;
+        let leaves = leaf_budget(count, false, 6, true);
+        let effort = Effort::BALANCED;
+        let limits =
+            Limits { leaves, source: None, leaf_max: 6, mixed: false, deep: false, effort };
+        let (refs, caller) = (series(count, 1.001), Caller::new(None, None));
+        let extent = Extent::around(&refs);
+        let areas = Areas::new(&extent.bounds.aabb());
+        let splitter = Splitter { limits: &limits, areas, whole: areas.of(&extent.bounds.aabb()) };
+        let ([depth, budget], known) = ([0, leaves], Known::of(extent));
+        let root = Task { node: 0, pairs: 2, first: 0, count, room: count, depth, budget, known };
+        let tree = |apart: bool| {
+            let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
+            let mut refs = refs.clone();
+            let grown = match apart {
+                true => splitter.grow_apart(root, &mut nodes, &mut refs, &caller),
+                false => splitter.grow_at_once(root, &mut nodes, &mut refs),
+            };
+            let size = grown.and_then(|()| close_gaps(&mut nodes, &mut refs)).expect("room");
+            nodes.truncate(size.nodes);
+            let bits =
+                |node: &BvhNode| (node.aabb().lower.map(f32::to_bits), node.first, node.lanes);
+            let ids: Vec<_> = refs.iter().map(PrimRef::id).collect();
+            (nodes.iter().map(bits).collect::<Vec<_>>(), ids)
+        };
+        assert!(tree(true) == tree(false));
     }
 }

@@ -6,7 +6,7 @@
 /// By induction: what is at most a leaf is one leaf, or two of different kinds; what is more, `leaf_max + 1` at
 /// least, has halves of at least `half`, the lesser half of that, and `count / half` is superadditive.
 pub(super) fn fewest_leaves(count: usize, mixed: bool, leaf_max: usize) -> usize {
-    let half = leaf_max.div_ceil(2);
+    let half = leaf_max.div_ceil(2).max(1);
     match (count, mixed) {
         (0 | 1, _) => count,
         (_, false) => (count / half).max(1),
@@ -24,7 +24,7 @@ pub(super) fn leaf_budget(count: usize, mixed: bool, leaf_max: usize, full: bool
 
 /// Levels below a node of `count` refs that is halved down to leaves.
 pub(super) fn levels_to_halve(count: usize, leaf_max: usize) -> usize {
-    let leaves = count.div_ceil(leaf_max).next_power_of_two();
+    let leaves = count.div_ceil(leaf_max.max(1)).next_power_of_two();
     // One more level, to part kinds.
     leaves.trailing_zeros() as usize + 1
 }

@@ -10,6 +10,7 @@ use super::tree::{Grown, Limits};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
+use crate::kinds::REFIT;
 use crate::prim::{Packer, Source, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage;
@@ -105,11 +106,11 @@ fn grow_tree(
     let limits = Limits { leaves, source: None, leaf_max: LEAF_MAX, mixed, deep: false, effort };
     let node_count = grow(nodes, refs, plan.ref_count, &limits, how.caller)?.nodes;
     // Triangles first, then spheres, each in the order of the leaves.
-    let kinds = [false, true];
-    let kinds =
-        kinds.into_iter().flat_map(|kind| refs.iter().filter(move |r| r.is_sphere() == kind));
-    for (id, r) in prim_ids.iter_mut().zip(kinds) {
-        *id = r.id();
+    let mut ids = prim_ids.iter_mut();
+    for kind in [false, true] {
+        for r in refs.iter().filter(|r| r.is_sphere() == kind) {
+            *ids.next()? = r.id();
+        }
     }
     Some(node_count)
 }
@@ -119,14 +120,18 @@ fn grow_tree(
 fn pack_leaves(scene: &Scene, census: &Census, counts: &Counts, bytes: &mut [u8]) -> Option<usize> {
     let PartsMut { geometries, prim_ids, nodes, sphere_blocks, triangle_blocks, .. } =
         counts.parts_mut(bytes)?;
-    let (triangles, spheres) = prim_ids.split_at(census.triangle_count as usize);
+    let (triangles, spheres) = prim_ids.split_at_checked(census.triangle_count as usize)?;
     let (mut triangles, mut spheres) = (triangles.iter(), spheres.iter());
     let mut packer = Packer::new(triangle_blocks, sphere_blocks, 0, census.triangle_count);
-    let mut shapes = Source { scene, geometries, named: census.refit }.shapes();
+    let mut shapes = Source { scene, geometries, named: REFIT && census.refit }.shapes();
     for_each_leaf(nodes, |node| {
         let (count, is_sphere) = Grown::of(node);
         let ids = if is_sphere { &mut spheres } else { &mut triangles };
-        let leaf = packer.push_leaf(ids.take(count).filter_map(|id| shapes.get(*id)))?;
+        let mut leaf = None;
+        for id in ids.take(count) {
+            packer.push_to(&mut leaf, &shapes.get(*id)?)?;
+        }
+        let leaf = leaf?;
         node.first = leaf.block;
         node.lanes = leaf.lanes;
         Some(())
@@ -143,7 +148,7 @@ fn for_each_leaf(
     let mut pending = 1;
     while pending > 0 {
         pending -= 1;
-        let node = nodes.get_mut(stack[pending] as usize)?;
+        let node = nodes.get_mut(*stack.get(pending)? as usize)?;
         if node.is_leaf() {
             f(node)?;
             continue;

@@ -21,6 +21,7 @@ mod spatial;
 mod split;
 mod stack;
 mod sweep;
+mod task;
 mod traverse;
 mod tree;
 mod validate;

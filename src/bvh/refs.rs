@@ -7,6 +7,7 @@ use core::ops::Range;
 use super::split::{Areas, Box4};
 use crate::block::Census;
 use crate::caller::{Caller, PARTS};
+use crate::kinds::{BALLS, REFIT, THREADS, WIDE};
 use crate::math::Aabb;
 use crate::prim::{GRAIN, Prim, Shape, for_each_named_in, for_each_prim_in};
 use crate::scene::Scene;
@@ -56,7 +57,7 @@ impl PrimRef {
     }
 
     pub fn is_sphere(&self) -> bool {
-        self.bounds.upper[3] < 0.0
+        BALLS && self.bounds.upper[3] < 0.0
     }
 
     /// The number of primitives: their ids are consecutive.
@@ -88,19 +89,26 @@ pub(crate) fn gather(
     refs: &mut [PrimRef],
 ) -> usize {
     let (all, sound) = (census.prim_limit as usize, census.ignored_count == 0);
-    let strips = (strip > 1).then(|| (strip, Areas::new(&census.bounds)));
-    let rooms = caller.map_parts(all, caller.part_size(all, GRAIN), |ids| {
+    let strips = (WIDE && strip > 1).then(|| (strip, Areas::new(&census.bounds)));
+    if !THREADS {
+        let mut whole = Part { ids: 0..all, refs, count: 0 };
+        whole.gather(scene, census, strips);
+        return whole.count;
+    }
+    let room = |ids: Range<usize>| {
         let room = if sound || ids.len() == all { ids.len() } else { hittable(scene, &ids) };
         (ids, room)
-    });
+    };
     let mut parts = [const { None }; PARTS];
-    let mut free = &mut *refs;
-    for (part, (ids, room)) in parts.iter_mut().zip(rooms) {
+    let (mut free, mut places) = (&mut *refs, parts.iter_mut());
+    caller.for_parts(all, caller.part_size(all, GRAIN), room, |(ids, room)| {
         let room = room.min(free.len());
         let (refs, rest) = core::mem::take(&mut free).split_at_mut(room);
         free = rest;
-        *part = Some(Part { ids, refs, count: 0 });
-    }
+        if let Some(part) = places.next() {
+            *part = Some(Part { ids, refs, count: 0 });
+        }
+    });
     caller.for_each(&mut parts, |part| {
         if let Some(part) = part {
             part.gather(scene, census, strips);
@@ -163,10 +171,11 @@ impl Part<'_> {
         // The last triangle.
         let mut last: Option<(u32, [[f32; 3]; 3])> = None;
         for_each_named_in(scene, ids, sound, |Prim { id, shape }, names| {
-            let aabb = if census.refit { shape.place(&census.bounds) } else { shape.aabb() };
+            let refit = REFIT && census.refit;
+            let aabb = if refit { shape.place(&census.bounds) } else { shape.aabb() };
             let new = PrimRef::new(id, &aabb, !shape.is_triangle());
-            let shape = if census.refit { names.of(shape) } else { shape };
-            let (Some(strips), Shape::Triangle(corners)) = (strips, shape) else {
+            let shape = if refit { names.of(shape) } else { shape };
+            let (Some(strips), Shape::Triangle(corners)) = (strips.filter(|_| WIDE), shape) else {
                 return self.push(new);
             };
             let follows = last.is_some_and(|(one, other)| {

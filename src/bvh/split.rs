@@ -13,8 +13,12 @@ pub(crate) struct Box4 {
 impl Box4 {
     pub const EMPTY: Box4 = Box4 { lower: [f32::INFINITY; 4], upper: [f32::NEG_INFINITY; 4] };
 
+    /// Of which bytes are zero; not empty.
+    pub const ZERO: Box4 = Box4 { lower: [0.0; 4], upper: [0.0; 4] };
+
     /// Grows the box until it holds `other`.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline)]
     pub fn add(&mut self, other: &Box4) {
         for k in 0..4 {
             self.lower[k] = lesser(other.lower[k], self.lower[k]);
@@ -73,10 +77,15 @@ impl Areas {
     }
 
     /// The same without a care for infinite boxes, whose area may be infinite or NaN.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline)]
     pub fn of_finite(self, all: &Box4) -> f32 {
         let s = self.0;
-        let [x, y, z, _]: [f32; 4] = core::array::from_fn(|k| all.upper[k] * s - all.lower[k] * s);
+        let mut edges = [0.0; 4];
+        for k in 0..4 {
+            edges[k] = all.upper[k] * s - all.lower[k] * s;
+        }
+        let [x, y, z, _] = edges;
         x * y + y * z + z * x
     }
 
@@ -96,6 +105,14 @@ pub(crate) struct Extent {
 impl Extent {
     pub const EMPTY: Extent = Extent { bounds: Box4::EMPTY, centres: Box4::EMPTY };
 
+    /// The boxes around both.
+    pub fn with(mut self, other: &Extent) -> Extent {
+        self.bounds.add(&other.bounds);
+        self.centres.add(&other.centres);
+        self
+    }
+
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn around(refs: &[PrimRef]) -> Extent {
         let mut extent = Extent::EMPTY;
         for r in refs {

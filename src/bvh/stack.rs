@@ -8,33 +8,41 @@ use super::MAX_DEPTH;
 use crate::block::bundle::ChildRef;
 use crate::simd::{Simd, Width};
 
-/// Nodes to come back to, each with the `t` at which the ray enters it. Those below `count` are written.
-pub(super) struct Pending {
-    entries: [MaybeUninit<(u32, f32)>; MAX_DEPTH],
+/// Nodes to come back to, or what stands for them. Those below `count` are written.
+pub(super) struct Pending<E> {
+    entries: [MaybeUninit<E>; MAX_DEPTH],
     count: usize,
 }
 
-impl Pending {
+impl<E: Copy> Pending<E> {
     #[inline(always)]
     pub fn new() -> Self {
         Pending { entries: [const { MaybeUninit::uninit() }; MAX_DEPTH], count: 0 }
     }
 
+    /// False when there is no room.
     #[inline(always)]
-    pub fn push(&mut self, node: u32, near: f32) {
-        if let Some(entry) = self.entries.get_mut(self.count) {
-            entry.write((node, near));
-            self.count += 1;
-        }
+    pub fn push(&mut self, new: E) -> bool {
+        let Some(entry) = self.entries.get_mut(self.count) else { return false };
+        entry.write(new);
+        self.count += 1;
+        true
     }
 
-    /// The last node pushed that the ray enters before `t_bound`.
     #[inline(always)]
-    pub fn pop(&mut self, t_bound: f32) -> Option<u32> {
+    pub fn pop(&mut self) -> Option<E> {
+        self.count = self.count.checked_sub(1)?;
+        // SAFETY: a push wrote it, and counted it afterwards.
+        Some(unsafe { self.entries.get(self.count)?.assume_init() })
+    }
+}
+
+impl Pending<(u32, f32)> {
+    /// The last node pushed that the ray enters before `t_bound`, of those pushed with the `t` at which it does.
+    #[inline(always)]
+    pub fn pop_within(&mut self, t_bound: f32) -> Option<u32> {
         loop {
-            self.count = self.count.checked_sub(1)?;
-            // SAFETY: a push wrote it, and counted it afterwards.
-            let (node, near) = unsafe { self.entries.get(self.count)?.assume_init() };
+            let (node, near) = self.pop()?;
             if near <= t_bound {
                 return Some(node);
             }

@@ -35,7 +35,8 @@ pub(crate) fn traverse<S: Simd, Q: Query>(
             node = child;
             continue;
         }
-        let Some(next) = stack.pop(query.t_bound()).and_then(|i| nodes.get(i as usize)) else {
+        let Some(next) = stack.pop_within(query.t_bound()).and_then(|i| nodes.get(i as usize))
+        else {
             return false;
         };
         node = next;
@@ -49,7 +50,7 @@ fn nearer_child<'n, Q: Query>(
     first: u32,
     slab: &impl Slab,
     query: &mut Q,
-    stack: &mut Pending,
+    stack: &mut Pending<(u32, f32)>,
 ) -> Option<&'n BvhNode> {
     let [left, right] = nodes.get(first as usize..)?.first_chunk::<2>()?;
     query.watch().step();
@@ -61,11 +62,11 @@ fn nearer_child<'n, Q: Query>(
         (false, true) => Some(left),
         (true, false) => Some(right),
         (false, false) if a.near <= b.near => {
-            stack.push(first + 1, b.near);
+            stack.push((first + 1, b.near));
             Some(left)
         }
         (false, false) => {
-            stack.push(first, a.near);
+            stack.push((first, a.near));
             Some(right)
         }
     }

@@ -7,9 +7,10 @@ use super::budget::{fewest_leaves, levels_to_halve};
 use super::refs::PrimRef;
 use super::spatial::{best_cut, overlap};
 use super::split::{Areas, Extent};
-use super::sweep::{FEW, sweep};
+use super::sweep::{FEW, sort_few, sweep};
+use super::task::{Known, Split, Task, Tasks};
 use crate::block::BvhNode;
-use crate::kinds::{SPHERES, WIDE};
+use crate::kinds::{BALLS, SPHERES, WIDE};
 use crate::math::Aabb;
 use crate::prim::{Shapes, Source};
 
@@ -32,7 +33,7 @@ impl Grown {
 
     /// The number of primitives, and whether they are spheres.
     pub fn of(node: &BvhNode) -> (usize, bool) {
-        ((node.lanes & 0xFF) as usize, node.lanes >> 8 & 1 != 0)
+        ((node.lanes & 0xFF) as usize, BALLS && node.lanes >> 8 & 1 != 0)
     }
 
     pub fn ref_count(node: &BvhNode) -> usize {
@@ -69,29 +70,6 @@ const SAVED: f32 = 0.02;
 /// Of fewer refs none are cut.
 const CUT_FROM: usize = 32;
 
-/// A subtree to build: the refs `first .. first + count` under node `node`.
-#[derive(Clone, Copy)]
-pub(super) struct Task {
-    pub node: u32,
-    /// Where the nodes below it begin.
-    pub pairs: u32,
-    pub first: usize,
-    pub count: usize,
-    /// Slots for its refs, from `first` on: more than there are, where refs may be cut.
-    pub room: usize,
-    pub depth: usize,
-    /// Leaves it may have.
-    pub budget: usize,
-    pub extent: Extent,
-}
-
-/// Where a node's refs are parted, the fewest leaves that either side needs, and their boxes.
-pub(super) struct Split {
-    counts: [usize; 2],
-    least: [usize; 2],
-    sides: [Extent; 2],
-}
-
 /// How nodes are split.
 #[derive(Clone, Copy)]
 pub(super) struct Splitter<'l, 's, 'a> {
@@ -110,7 +88,7 @@ pub(super) struct Scratch<'s, 'a> {
 impl<'s, 'a> Splitter<'_, 's, 'a> {
     pub fn scratch(self) -> Scratch<'s, 'a> {
         let shapes = self.limits.source.map(Source::shapes);
-        Scratch { bins: Bins::EMPTY, shapes }
+        Scratch { bins: Bins::UNUSED, shapes }
     }
 
     /// Grows a branch; returns its root.
@@ -118,16 +96,15 @@ impl<'s, 'a> Splitter<'_, 's, 'a> {
         let Branch { task: whole, nodes, refs, .. } = branch;
         let mut root = None;
         let mut scratch = self.scratch();
-        let mut stack = [*whole; MAX_DEPTH];
-        let mut pending = 1;
+        let mut stack = Tasks::NONE;
+        stack.push(whole)?;
         let mut used = whole.pairs;
-        while pending > 0 {
-            pending -= 1;
-            let task = stack[pending];
+        while let Some(task) = stack.pop() {
             let first = task.first - whole.first;
             let slots = refs.get_mut(first..first + task.room)?;
-            let split = self.part(slots, &task, &mut scratch);
-            let aabb = task.extent.bounds.aabb();
+            let extent = task.known.extent(slots.get(..task.count)?);
+            let split = self.part(slots, &task, &extent, &mut scratch);
+            let aabb = extent.bounds.aabb();
             let node = match &split {
                 None => Grown::leaf(&aabb, task.first, slots.get(..task.count)?),
                 Some(_) => BvhNode::inner(&aabb, used),
@@ -140,67 +117,43 @@ impl<'s, 'a> Splitter<'_, 's, 'a> {
             let [left, right] = task.children(&split, used, slots)?;
             used += 2;
             // The left child is taken next, so its subtree is stored before the right one's.
-            for child in [right, left] {
-                *stack.get_mut(pending)? = child;
-                pending += 1;
-            }
+            stack.push(&right)?;
+            stack.push(&left)?;
         }
         root
     }
 }
 
-impl Task {
-    /// The tasks of the sides, whose nodes are the pair at `pair`. The right one's refs are moved behind
-    /// the left one's room.
-    pub fn children(&self, split: &Split, pair: u32, slots: &mut [PrimRef]) -> Option<[Task; 2]> {
-        let depth = self.depth + 1;
-        let ([count, right_count], budget) = (split.counts, share(self, split));
-        let [left, right] = split.sides;
-        let (first, pairs) = (self.first, pair + 2);
-        // Each side has its part of the free slots.
-        let free = self.room.checked_sub(count + right_count)?;
-        let room = count + part_of(free, count, count + right_count);
-        if free > 0 {
-            slots.get(..room + right_count)?;
-            slots.copy_within(count..count + right_count, room);
-        }
-        let left = Task { node: pair, pairs, first, count, room, depth, budget, extent: left };
-        // A subtree has a pair for each of its leaves but one.
-        let pairs = pairs + 2 * (budget as u32).saturating_sub(1);
-        let (first, count, room) = (first + room, right_count, self.room - room);
-        let budget = self.budget - budget;
-        let node = pair + 1;
-        Some([left, Task { node, pairs, first, count, room, depth, budget, extent: right }])
-    }
-}
-
-/// The leaves that the left child may have: its share by count, but enough for either side.
-fn share(task: &Task, split: &Split) -> usize {
-    let ([least, least_right], [left, right]) = (split.least, split.counts);
-    let most = task.budget.saturating_sub(least_right).max(least);
-    part_of(task.budget, left, left + right).clamp(least, most).min(task.budget)
-}
-
-/// As much of `all` as `part` is of `whole`, rounded down.
-fn part_of(all: usize, part: usize, whole: usize) -> usize {
-    (all as u64 * part as u64 / whole as u64) as usize
-}
-
 impl Splitter<'_, '_, '_> {
     /// Parts what the first slots hold in two, or decides for a leaf.
-    pub fn part(self, slots: &mut [PrimRef], task: &Task, scratch: &mut Scratch) -> Option<Split> {
-        let split = self.part_refs(slots.get_mut(..task.count)?, task, &mut scratch.bins)?;
+    pub fn part(
+        self,
+        slots: &mut [PrimRef],
+        task: &Task,
+        extent: &Extent,
+        scratch: &mut Scratch,
+    ) -> Option<Split> {
+        let refs = slots.get_mut(..task.count)?;
+        let split = self.part_refs(refs, task, extent, &mut scratch.bins)?;
         if task.count < CUT_FROM || task.room == task.count {
             return Some(split);
         }
         // Compact trees are not cut.
         let Some(shapes) = scratch.shapes.as_mut().filter(|_| WIDE) else { return Some(split) };
-        Some(self.cut(slots, task, &split, shapes).unwrap_or(split))
+        Some(self.cut(slots, (task, extent), &split, shapes).unwrap_or(split))
     }
 
     /// Parts the refs of a node in two, or decides for a leaf.
-    fn part_refs(self, refs: &mut [PrimRef], task: &Task, bins: &mut Bins) -> Option<Split> {
-        let (Limits { leaf_max, mixed, deep, effort, .. }, areas) = (*self.limits, self.areas);
+    fn part_refs(
+        self,
+        refs: &mut [PrimRef],
+        task: &Task,
+        extent: &Extent,
+        bins: &mut Bins,
+    ) -> Option<Split> {
+        let (Limits { leaf_max, effort, .. }, areas) = (*self.limits, self.areas);
+        // Only wide trees are deep.
+        let (mixed, deep) = (SPHERES && self.limits.mixed, WIDE && self.limits.deep);
         let count = refs.len();
         let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
         let one_kind = !mixed || spheres == 0 || spheres == count;
@@ -210,21 +163,17 @@ impl Splitter<'_, '_, '_> {
         }
         let least = |left_count: usize| self.fewest([left_count, count - left_count]);
         let pays = |work: f32| {
-            let area = areas.of(&task.extent.bounds.aabb());
+            let area = areas.of(&extent.bounds.aabb());
             // Everything on one line or in one point: any split is as good as another.
             STEP_COST * area + work < area * count as f32 || area == 0.0
         };
         let lasts = |left_count: usize| self.lasts(task, [left_count, count - left_count]);
         let sah = if count <= FEW {
             let sweep = sweep(refs, areas, lasts).filter(|s| !may_be_leaf || deep || pays(s.work));
-            sweep.map(|s| Split {
-                counts: [s.left_count, count - s.left_count],
-                least: least(s.left_count),
-                sides: s.sides,
-            })
+            sweep.map(|s| split_at(refs, s.left_count, least(s.left_count)))
         } else {
             // None when all centres are in one point.
-            best_plane(refs, &task.extent.centres, areas, effort, bins).and_then(|plane| {
+            best_plane(refs, &extent.centres, areas, effort, bins).and_then(|plane| {
                 let left_count = plane.part(refs);
                 lasts(left_count).then(|| split_at(refs, left_count, least(left_count)))
             })
@@ -234,7 +183,7 @@ impl Splitter<'_, '_, '_> {
             None if may_be_leaf => None,
             // Few, but of two kinds: each kind can be one leaf.
             None if SPHERES && count <= leaf_max => {
-                refs.sort_unstable_by_key(|r| (r.is_sphere(), r.id()));
+                sort_few(refs, |r| (r.is_sphere(), r.id()));
                 Some(split_at(refs, count - spheres, [1, 1]))
             }
             None => Some(split_at(refs, count / 2, least(count / 2))),
@@ -245,26 +194,28 @@ impl Splitter<'_, '_, '_> {
     fn cut(
         self,
         slots: &mut [PrimRef],
-        task: &Task,
+        (task, extent): (&Task, &Extent),
         split: &Split,
         shapes: &mut Shapes,
     ) -> Option<Split> {
-        let [left, right] = &split.sides;
+        let refs = slots.get(..task.count)?;
+        let (left, right) = refs.split_at_checked(split.counts[0])?;
+        let [left, right] = [split.sides[0].extent(left), split.sides[1].extent(right)];
         let areas = self.areas;
-        let area = areas.of(&task.extent.bounds.aabb());
+        let area = areas.of(&extent.bounds.aabb());
         let least = (OVERLAP * self.whole).max(OVERLAP_OF_NODE * area);
         if overlap(areas, [&left.bounds, &right.bounds]) <= least {
             return None;
         }
-        let work = |i: usize| areas.of_finite(&split.sides[i].bounds) * split.counts[i] as f32;
+        let work = |side: &Extent, count: usize| areas.of_finite(&side.bounds) * count as f32;
+        let work = work(&left, split.counts[0]) + work(&right, split.counts[1]);
         let allowed = |counts: [usize; 2]| {
             let [left, right] = counts;
             let fits = left + right <= task.room && left.max(right) < task.count;
             fits && self.lasts(task, counts)
         };
-        let refs = slots.get(..task.count)?;
-        let cut = best_cut(refs, &task.extent.bounds, areas, allowed)?;
-        if cut.work >= (1.0 - SAVED) * (work(0) + work(1)) {
+        let cut = best_cut(refs, &extent.bounds, areas, allowed)?;
+        if cut.work >= (1.0 - SAVED) * work {
             return None;
         }
         let counts = cut.part(slots, task.count, shapes)?;
@@ -274,8 +225,10 @@ impl Splitter<'_, '_, '_> {
 
     /// The fewest leaves that two sides need.
     fn fewest(self, counts: [usize; 2]) -> [usize; 2] {
-        let Limits { mixed, leaf_max, .. } = *self.limits;
-        counts.map(|count| fewest_leaves(count, mixed, leaf_max))
+        let Limits { leaf_max, .. } = *self.limits;
+        let mixed = SPHERES && self.limits.mixed;
+        let [left, right] = counts;
+        [fewest_leaves(left, mixed, leaf_max), fewest_leaves(right, mixed, leaf_max)]
     }
 
     /// Whether leaves and levels last for these sides.
@@ -287,9 +240,9 @@ impl Splitter<'_, '_, '_> {
 }
 
 fn split_at(refs: &[PrimRef], left_count: usize, least: [usize; 2]) -> Split {
-    let (left, right) = refs.split_at(left_count);
+    let (left, right) = refs.split_at_checked(left_count).unwrap_or((refs, &[]));
     let counts = [left.len(), right.len()];
-    Split { counts, least, sides: [Extent::around(left), Extent::around(right)] }
+    Split { counts, least, sides: [Known::around(left), Known::around(right)] }
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Whether the tree of a foreign block can be traversed.
 
 use super::MAX_DEPTH;
+use super::stack::Pending;
 use crate::block::BvhNode;
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::leaf::KIND_SPHERES;
@@ -16,8 +17,7 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
     if nodes.len() < 2 {
         return false;
     }
-    let mut stack = [0u32; MAX_DEPTH];
-    let mut count = 0;
+    let mut right = Pending::new();
     let mut next_pair = 2;
     let mut at = 0;
     loop {
@@ -26,20 +26,18 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
             if !leaves.has(node.leaf()) {
                 return false;
             }
-            if count == 0 {
+            let Some(next) = right.pop() else {
                 // The walk is over: all nodes must have been met.
                 return next_pair as usize == nodes.len();
-            }
-            count -= 1;
-            let Some(entry) = stack.get(count) else { return false };
-            at = *entry;
+            };
+            at = next;
         } else {
-            let Some(entry) = stack.get_mut(count) else { return false };
             if node.first != next_pair || next_pair as usize + 1 >= nodes.len() {
                 return false;
             }
-            *entry = node.first + 1;
-            count += 1;
+            if !right.push(node.first + 1) {
+                return false;
+            }
             at = node.first;
             next_pair += 2;
         }

@@ -15,6 +15,7 @@ use crate::accel::Layout;
 use crate::build::{BuildOptions, PlainList, Quality};
 use crate::caller::Threads;
 use crate::grid::{GridKind, GridOptions};
+use crate::kinds::THREADS;
 
 /// A C caller during a build.
 pub(super) struct Lender(Option<RtBuildOptions>);
@@ -77,7 +78,7 @@ impl Lender {
             _ => return Err(Error::InvalidArgument),
         };
         let threads: Option<&dyn Threads> =
-            if raw.parallel_for.is_some() { Some(self) } else { None };
+            if THREADS && raw.parallel_for.is_some() { Some(self) } else { None };
         let (grid, rays_per_prim) = (grid_options(raw)?, raw.rays_per_prim);
         // Written so that a NaN is refused.
         if !(rays_per_prim >= 0.0) {

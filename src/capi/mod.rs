@@ -57,7 +57,8 @@ fn stopping_panics<R>(work: impl FnOnce() -> R) -> Option<R> {
 ///
 /// `accel` is null, or it is what a build, `rt_accel_open` or `rt_accel_pack` returned, or a copy of
 /// that block, and nobody writes to it during `'m`.
-#[inline(always)]
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 unsafe fn accel_at<'m>(accel: *const RtAccel) -> Result<Accel<'m>, Error> {
     if accel.is_null() {
         return Err(Error::NullPointer);

@@ -8,6 +8,7 @@ use super::accel_at;
 use super::status::Error;
 use super::types::{RtInstance, RtMesh, RtScene, RtSphereSet};
 use super::versioned::{self, Growing};
+use crate::kinds::INSTANCES;
 use crate::scene::{Geometries, Instance, Mesh, Placements, SphereSet, Strided};
 
 /// A scene in C's types all of whose pointers, counts and strides are right.
@@ -35,6 +36,9 @@ impl<'a> CheckedScene<'a> {
         let (count, size) = (scene.sphere_set_count, scene.sphere_set_size);
         // SAFETY: the caller's promise.
         let sphere_sets = unsafe { Elements::new(scene.sphere_sets, count, size) }?;
+        if !INSTANCES && scene.instance_count > 0 {
+            return Err(Error::Layout);
+        }
         let (count, size) = (scene.instance_count, scene.instance_size);
         // SAFETY: the caller's promise.
         let instances = unsafe { Elements::new(scene.instances, count, size) }?;
@@ -73,7 +77,7 @@ impl<'a> CheckedScene<'a> {
     }
 
     fn checked_instance(&self, i: usize) -> Result<Instance<'a>, Error> {
-        let instance = self.instances.get(i).ok_or(Error::Internal)?;
+        let instance = self.instances.get(i).filter(|_| INSTANCES).ok_or(Error::Internal)?;
         if instance.reserved != 0 {
             return Err(Error::InvalidArgument);
         }

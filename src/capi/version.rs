@@ -7,7 +7,7 @@ const _: () = assert!(RT_RAYKERN_VERSION == version());
 /// The version of the library, in the form of RT_RAYKERN_VERSION.
 #[unsafe(no_mangle)]
 pub extern "C" fn rt_version() -> u32 {
-    version()
+    const { version() }
 }
 
 /// The version in Cargo.toml as `major << 16 | minor << 8 | patch`.

@@ -29,10 +29,12 @@ fn add_ring(sum: &mut Fixed, x: &[f32; 3], [p, q, r]: [&[f32; 3]; 3], minus: boo
     add_volume(sum, [x, r, p], minus);
 }
 
-fn ring(x: &[f32; 3], corners: [&[f32; 3]; 3]) -> Fixed {
+/// A ring in `f64`, within `1.001 UNIT`; its sign is exact.
+#[inline(never)]
+fn ring(x: &[f32; 3], corners: [&[f32; 3]; 3]) -> f64 {
     let mut sum = Fixed::ZERO;
     add_ring(&mut sum, x, corners, false);
-    sum
+    sum.approximate()
 }
 
 /// See [`triangle::volumes`]: exact in sign, and in size within `1.001 UNIT`.
@@ -40,26 +42,22 @@ fn ring(x: &[f32; 3], corners: [&[f32; 3]; 3]) -> Fixed {
 pub(crate) fn volumes(line: &Line, [a, b, c]: Triangle) -> [f64; 3] {
     let mut volumes = [0.0; 3];
     for (volume, [p, q]) in volumes.iter_mut().zip([[&c, &a], [&a, &b], [&b, &c]]) {
-        *volume = ring(&line.direction, [p, q, &line.origin]).approximate();
+        *volume = ring(&line.direction, [p, q, &line.origin]);
     }
     volumes
 }
 
 /// See [`triangle::normal`]: each component within `1.001 UNIT` of the real one.
 pub(crate) fn normal([a, b, c]: Triangle) -> [f64; 3] {
-    let mut normal = [0.0; 3];
-    for (k, component) in normal.iter_mut().enumerate() {
-        let mut axis = [0.0; 3];
-        axis[k] = 1.0;
-        *component = ring(&axis, [&a, &b, &c]).approximate();
-    }
-    normal
+    AXES.map(|axis| ring(&axis, [&a, &b, &c]))
 }
+
+const AXES: [[f32; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// Whether the triangle has area.
 #[inline(never)]
-pub(crate) fn has_area(triangle: Triangle) -> bool {
-    normal(triangle).iter().any(|x| *x != 0.0)
+pub(crate) fn has_area([a, b, c]: Triangle) -> bool {
+    AXES.iter().any(|axis| ring(axis, [&a, &b, &c]) != 0.0)
 }
 
 /// The `t` at which a line meets a plane, or a float.
@@ -73,7 +71,7 @@ impl Quotient {
     /// The `t` at which the line meets the plane of a triangle; `None` when it is parallel to it.
     pub fn new(line: &Line, triangle: Triangle) -> Option<Self> {
         let [a, b, c] = &triangle;
-        let is_parallel = ring(&line.direction, [a, b, c]).sign() == Ordering::Equal;
+        let is_parallel = ring(&line.direction, [a, b, c]) == 0.0;
         (!is_parallel).then_some(Quotient::Of(*line, triangle))
     }
 
@@ -92,27 +90,37 @@ impl Quotient {
         }
     }
 
-    /// `(a - origin) . n`.
+    /// Adds `(a - origin) . n` to zero.
     #[inline(never)]
-    fn dividend(&self) -> Fixed {
+    fn add_dividend(&self, sum: &mut Fixed) {
         match self {
-            Quotient::Float(x) => Fixed::of(*x),
+            Quotient::Float(x) => sum.add_float(*x),
             Quotient::Of(line, [a, b, c]) => {
-                let mut sum = Fixed::ZERO;
-                add_volume(&mut sum, [a, b, c], false);
-                add_ring(&mut sum, &line.origin, [a, b, c], true);
-                sum
+                add_volume(sum, [a, b, c], false);
+                add_ring(sum, &line.origin, [a, b, c], true);
             }
         }
     }
 
-    /// `direction . n`.
+    /// Adds `direction . n` to zero.
     #[inline(never)]
-    fn divisor(&self) -> Fixed {
+    fn add_divisor(&self, sum: &mut Fixed) {
         match self {
-            Quotient::Float(_) => Fixed::of(Binary { mantissa: 1, exponent: 0 }),
-            Quotient::Of(line, [a, b, c]) => ring(&line.direction, [a, b, c]),
+            Quotient::Float(_) => sum.add_float(Binary { mantissa: 1, exponent: 0 }),
+            Quotient::Of(line, [a, b, c]) => add_ring(sum, &line.direction, [a, b, c], false),
         }
+    }
+
+    /// The dividend or the divisor in `f64`, within `1.001 UNIT`. One at a time is on the stack.
+    #[inline(never)]
+    fn part(&self, divisor: bool) -> f64 {
+        let mut sum = Fixed::ZERO;
+        if divisor {
+            self.add_divisor(&mut sum)
+        } else {
+            self.add_dividend(&mut sum)
+        }
+        sum.approximate()
     }
 
     /// The quotient in `f64`, and a bound on its error.
@@ -120,7 +128,7 @@ impl Quotient {
     /// Dividend and divisor are off by `1.001 UNIT` each, and their quotient is rounded: below
     /// `3.01 UNIT`. Both are between 2^-447 and 2^392 in size, far from the ends of `f64`.
     pub fn approximate(&self) -> (f64, f64) {
-        let t = self.dividend().approximate() / self.divisor().approximate();
+        let t = self.part(false) / self.part(true);
         (t, 4.0 * UNIT * t.abs())
     }
 
@@ -144,7 +152,9 @@ impl Quotient {
     /// Adds the product of the sizes of the own dividend and the other's divisor, and says what their signs are.
     #[inline(never)]
     fn add_sizes(&self, other: &Quotient, product: &mut Product) -> [i32; 2] {
-        let (mut dividend, mut divisor) = (self.dividend(), other.divisor());
+        let (mut dividend, mut divisor) = (Fixed::ZERO, Fixed::ZERO);
+        self.add_dividend(&mut dividend);
+        other.add_divisor(&mut divisor);
         let signs = [dividend.take_sign() as i32, divisor.take_sign() as i32];
         product.add(&dividend, &divisor);
         signs

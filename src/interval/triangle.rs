@@ -107,6 +107,7 @@ pub(super) fn volume_error(line: &Line, triangle: [[f32; 3]; 3]) -> f64 {
 }
 
 /// Which part of the triangle the line meets: it does when all volumes that are not zero have one sign.
+#[cfg_attr(target_os = "none", inline(never))]
 fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Feature> {
     let volumes = exact::volumes(line, triangle);
     let met = volumes.iter().any(|v| *v < 0.0) != volumes.iter().any(|v| *v > 0.0);
@@ -177,19 +178,18 @@ pub(crate) fn has_area(triangle: [[f32; 3]; 3]) -> bool {
 fn surely_has_area([a, b, c]: [[f32; 3]; 3]) -> bool {
     // Products that underflow are off by 2^-150 each, which this is far above.
     const TINY: f32 = f32::MIN_POSITIVE;
-    let (e1, e2): ([f32; 3], [f32; 3]) =
-        (core::array::from_fn(|k| b[k] - a[k]), core::array::from_fn(|k| c[k] - a[k]));
-    let mut sure = false;
-    for (i, j) in [(1, 2), (2, 0), (0, 1)] {
-        let (p, q) = (e1[i] * e2[j], e1[j] * e2[i]);
-        // As below, with the roundings of single precision and half of that again. False where products overflow.
-        sure |= (p - q).abs() > 16.0 * UNIT32 * (p.abs() + q.abs()) + TINY;
-    }
-    sure
+    let minus = |[px, py, pz]: [f32; 3], [qx, qy, qz]: [f32; 3]| [px - qx, py - qy, pz - qz];
+    let ([px, py, pz], [qx, qy, qz]) = (minus(b, a), minus(c, a));
+    // As below, with the roundings of single precision and half of that again. False where products overflow.
+    let apart = |p: f32, q: f32| (p - q).abs() > 16.0 * UNIT32 * (p.abs() + q.abs()) + TINY;
+    apart(py * qz, pz * qy) | apart(pz * qx, px * qz) | apart(px * qy, py * qx)
 }
 
 #[inline(never)]
 fn has_area_in_doubt(triangle: [[f32; 3]; 3]) -> bool {
+    if SLOW_F64 {
+        return exact::has_area(triangle);
+    }
     let [a, b, c] = triangle.map(wide);
     let (e1, e2) = (b - a, c - a);
     let surely = |k: usize| {

@@ -48,8 +48,14 @@ impl Aabb {
     }
 
     /// The largest coordinate in size; 0 for the empty box.
+    #[cfg_attr(target_os = "none", inline(never))]
     pub fn reach(&self) -> f32 {
-        let corners = self.lower.into_iter().chain(self.upper);
-        if self.lower[0] > self.upper[0] { 0.0 } else { corners.fold(0.0, |m, x| x.abs().max(m)) }
+        let mut reach = 0.0;
+        for k in 0..3 {
+            for x in [self.lower[k].abs(), self.upper[k].abs()] {
+                reach = if x > reach { x } else { reach };
+            }
+        }
+        if self.lower[0] > self.upper[0] { 0.0 } else { reach }
     }
 }

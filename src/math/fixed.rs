@@ -24,11 +24,9 @@ pub(crate) struct Fixed {
 impl Fixed {
     pub const ZERO: Self = Fixed { words: [0; 27], length: 0 };
 
-    /// `x`, whose exponent is -447 at least.
-    pub fn of(x: Binary) -> Self {
-        let mut sum = Self::ZERO;
-        sum.add(u64::from(x.mantissa.unsigned_abs()), 1, x.exponent, x.mantissa < 0);
-        sum
+    /// Adds `x`, whose exponent is -447 at least.
+    pub fn add_float(&mut self, x: Binary) {
+        self.add(u64::from(x.mantissa.unsigned_abs()), 1, x.exponent, x.mantissa < 0);
     }
 
     /// Adds the product of three floats, or subtracts it.
@@ -100,7 +98,8 @@ impl Fixed {
     }
 
     /// The number in `f64`, within `1.001 UNIT` of it: the bits below the highest 64 are cut off, and 64 are rounded to 53.
-    pub fn approximate(mut self) -> f64 {
+    /// It becomes its size.
+    pub fn approximate(&mut self) -> f64 {
         let sign = self.take_sign();
         let Some(highest) = self.words.iter().rposition(|word| *word != 0) else { return 0.0 };
         let word = |below: usize| match highest.checked_sub(below) {

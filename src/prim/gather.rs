@@ -7,9 +7,11 @@ use crate::block::{Census, Geometry};
 use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::interval::triangle::has_area;
+use crate::kinds::{BALLS, INSTANCES, REFIT, SPHERES, THREADS};
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
 use crate::scene::Scene;
+use crate::simd::SMALL;
 
 /// Flat numbers and block references leave two bits for other uses.
 const MOST_PRIMS: usize = 1 << 30;
@@ -48,7 +50,8 @@ pub(crate) struct Survey {
 
 impl Shape {
     /// The shape, if it can be hit: finite, with area or radius.
-    #[inline(always)]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn sound(self) -> Option<Shape> {
         let sound = match self {
             Shape::Triangle(corners) => {
@@ -57,10 +60,11 @@ impl Shape {
                 let finite = (a + b) + c == 0.0;
                 finite && has_area(corners)
             }
+            Shape::Sphere { .. } if !SPHERES => false,
             Shape::Sphere { centre, radius } => {
                 centre.iter().all(|x| x.is_finite()) && radius.is_finite() && radius > 0.0
             }
-            Shape::Box(aabb) => aabb.lower[0] <= aabb.upper[0],
+            Shape::Box(aabb) => INSTANCES && aabb.lower[0] <= aabb.upper[0],
         };
         sound.then_some(self)
     }
@@ -70,6 +74,9 @@ impl Shape {
     pub fn place(self, bounds: &Aabb) -> Aabb {
         if let Some(sound) = self.sound() {
             return sound.aabb();
+        }
+        if !REFIT {
+            return Aabb::EMPTY;
         }
         let points = match self {
             Shape::Triangle(corners) => corners,
@@ -93,11 +100,14 @@ impl Shape {
                 // Of equal zeros the first stays, as in `Aabb::add`; but without a branch.
                 let least = |x: f32, y: f32| if y < x { y } else { x };
                 let most = |x: f32, y: f32| if y > x { y } else { x };
-                Aabb {
-                    lower: [0, 1, 2].map(|k| least(least(a[k], b[k]), c[k])),
-                    upper: [0, 1, 2].map(|k| most(most(a[k], b[k]), c[k])),
+                let mut aabb = Aabb { lower: a, upper: a };
+                for k in 0..3 {
+                    aabb.lower[k] = least(least(a[k], b[k]), c[k]);
+                    aabb.upper[k] = most(most(a[k], b[k]), c[k]);
                 }
+                aabb
             }
+            _ if !BALLS => Aabb::EMPTY,
             Shape::Sphere { centre, radius } => {
                 // Sums of two floats far apart in size are rounded in f64 too: one step outwards
                 // makes up for it.
@@ -112,7 +122,7 @@ impl Shape {
 
     /// Whether it is a triangle. What is not goes where spheres go.
     pub fn is_triangle(&self) -> bool {
-        matches!(self, Shape::Triangle(_))
+        !BALLS || matches!(self, Shape::Triangle(_))
     }
 }
 
@@ -146,14 +156,38 @@ pub(crate) fn survey(scene: &Scene) -> Result<Survey, BuildError> {
     })
 }
 
+/// What is called with shapes. Unlike a closure's address, that of one of these stands for one copy of its code.
+trait Take<T> {
+    fn take(&mut self, what: T, names: Names);
+}
+
+impl<T, F: FnMut(T, Names)> Take<T> for F {
+    fn take(&mut self, what: T, names: Names) {
+        self(what, names);
+    }
+}
+
 /// Calls `f` with the numbers in `range` and what has them, `None` for a triangle without vertices; and with what knows
-/// its vertices by name.
+/// its vertices by name. Where room is scarce all share one loop.
 #[inline]
-fn for_each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut(u32, Option<Shape>, Names)) {
+fn for_each_shape(
+    scene: &Scene,
+    range: Range<u32>,
+    mut f: impl FnMut((u32, Option<Shape>), Names),
+) {
+    #[inline(never)]
+    fn shared(scene: &Scene, range: Range<u32>, f: &mut dyn Take<(u32, Option<Shape>)>) {
+        each_shape(scene, range, |what, names| f.take(what, names));
+    }
+    if SMALL { shared(scene, range, &mut f) } else { each_shape(scene, range, f) }
+}
+
+#[inline]
+fn each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut((u32, Option<Shape>), Names)) {
     let Range { start, end } = range;
-    if let Some(boxes) = scene.boxes() {
+    if let Some(boxes) = scene.boxes().filter(|_| INSTANCES) {
         return (start..end.min(boxes.count() as u32))
-            .for_each(|i| f(i, Some(Shape::Box(boxes.aabb(i as usize))), Names(None)));
+            .for_each(|i| f((i, Some(Shape::Box(boxes.aabb(i as usize)))), Names(None)));
     }
     let mut first = 0;
     // The part of a geometry with `count` primitives that is in the range.
@@ -166,13 +200,16 @@ fn for_each_shape(scene: &Scene, range: Range<u32>, mut f: impl FnMut(u32, Optio
         let (base, part) = next(mesh.triangle_count());
         for i in part {
             let shape = mesh.triangle(i as usize).map(Shape::Triangle);
-            f(base + i, shape, Names(Some((&mesh, base, i))));
+            f((base + i, shape), Names(Some((&mesh, base, i))));
         }
+    }
+    if !SPHERES {
+        return;
     }
     for set in (0..scene.sphere_set_count()).filter_map(|s| scene.sphere_set(s)) {
         let (base, part) = next(set.sphere_count());
         for i in part {
-            f(base + i, set.sphere(i as usize).map(sphere), Names(None));
+            f((base + i, set.sphere(i as usize).map(sphere)), Names(None));
         }
     }
 }
@@ -202,7 +239,16 @@ pub(crate) fn for_each_named_in(
     sound: bool,
     mut f: impl FnMut(Prim, Names),
 ) {
-    for_each_shape(scene, range, |id, shape, names| {
+    #[inline(never)]
+    fn shared(scene: &Scene, range: Range<u32>, sound: bool, f: &mut dyn Take<Prim>) {
+        each_prim(scene, range, sound, |prim, names| f.take(prim, names));
+    }
+    if SMALL { shared(scene, range, sound, &mut f) } else { each_prim(scene, range, sound, f) }
+}
+
+#[inline]
+fn each_prim(scene: &Scene, range: Range<u32>, sound: bool, mut f: impl FnMut(Prim, Names)) {
+    for_each_shape(scene, range, |(id, shape), names| {
         if let Some(shape) = shape.and_then(|shape| if sound { Some(shape) } else { shape.sound() })
         {
             f(Prim { id, shape }, names);
@@ -254,21 +300,28 @@ impl Census {
         };
         let none = census;
         let count = survey.prim_limit as usize;
-        let tallies = caller.map_parts(count, caller.part_size(count, GRAIN), |range| {
+        if !THREADS {
+            let counted = census.tally(scene, 0..count);
+            return counted.map_or_else(|id| Err(incomplete(scene, id)), |()| Ok(census));
+        }
+        let tally = |range| {
             let mut part = none;
             part.tally(scene, range).map(|()| part)
+        };
+        let mut missing = None;
+        let size = caller.part_size(count, GRAIN);
+        caller.for_parts(count, size, tally, |part| match part {
+            Ok(part) => census.add(&part),
+            Err(id) => missing = missing.or(Some(id)),
         });
-        for part in tallies {
-            census.add(&part.map_err(|id| incomplete(scene, id))?);
-        }
-        Ok(census)
+        missing.map_or(Ok(census), |id| Err(incomplete(scene, id)))
     }
 
     /// Adds the primitives in `range`. The error is the first triangle without its vertices.
     fn tally(&mut self, scene: &Scene, range: Range<usize>) -> Result<(), u32> {
         let range = range.start as u32..range.end as u32;
         let mut missing = None;
-        for_each_shape(scene, range, |id, shape, _| match shape.map(Shape::sound) {
+        for_each_shape(scene, range, |(id, shape), _| match shape.map(Shape::sound) {
             Some(Some(shape)) => {
                 self.bounds.add(&shape.aabb());
                 match shape {

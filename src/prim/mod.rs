@@ -21,7 +21,7 @@ use crate::block::Block;
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock,
 };
-use crate::kinds::SPHERES;
+use crate::kinds::{BALLS, SPHERES};
 use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
@@ -80,7 +80,7 @@ impl Leaves<'_> {
                 return true;
             }
         }
-        for (number, block) in self.sphere_blocks.iter().enumerate() {
+        for (number, block) in self.sphere_blocks.iter().enumerate().filter(|_| BALLS) {
             if self.intersect_block(s, KIND_SPHERES, number, block.lanes(), ray, query) {
                 return true;
             }
@@ -121,7 +121,8 @@ impl Leaves<'_> {
     }
 
     /// Offers `query` what the ray meets among those of `lanes` that are in use.
-    #[inline(always)]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn intersect_block<S: Simd, Q: Query>(
         &self,
         s: S,
@@ -187,7 +188,7 @@ impl Leaves<'_> {
 
 /// Offers `query` what the ray meets among some lanes of a block, one after the other: in little code. Their order matters
 /// to no answer.
-#[inline(never)]
+#[cfg_attr(not(target_os = "none"), inline(never))]
 fn one_by_one<Q: Query>(
     block: &TriangleBlock,
     number: u32,

@@ -1,5 +1,7 @@
 //! Vertices by their numbers, where they will move: equal now need not be equal later.
 
+use core::ops::Range;
+
 use super::gather::{GRAIN, Shape};
 use crate::caller::Caller;
 use crate::scene::{Mesh, Scene};
@@ -30,15 +32,16 @@ impl Names<'_, '_> {
 /// A digest of the vertex numbers of all triangles; `None` if one has no vertex. Any change of a number changes it, but
 /// for one in 2^64.
 pub(crate) fn digest(scene: &Scene, caller: &Caller) -> Option<u64> {
-    let mut sum = 0u64;
+    let mut sum = Some(0u64);
     for (m, mesh) in (0u64..).zip((0..scene.mesh_count()).filter_map(|m| scene.mesh(m))) {
         let count = mesh.triangle_count();
-        let mut parts = caller.map_parts(count, caller.part_size(count, GRAIN), |triangles| {
+        let digest = |triangles: Range<usize>| {
             triangles.map(|i| triangle_digest(&mesh, m, i)).try_fold(0, add)
-        });
-        sum = parts.try_fold(sum, add)?;
+        };
+        let size = caller.part_size(count, GRAIN);
+        caller.for_parts(count, size, digest, |part| sum = sum.and_then(|sum| add(sum, part)));
     }
-    Some(sum)
+    sum
 }
 
 fn add(sum: u64, more: Option<u64>) -> Option<u64> {

@@ -6,6 +6,7 @@ use crate::block::leaf::{
     block_ref,
 };
 use crate::block::{Census, PartsMut};
+use crate::kinds::{BALLS, REFIT};
 use crate::math::rounding::f32_above;
 use crate::math::{Aabb, sum_abs, wide};
 use crate::scene::Scene;
@@ -15,10 +16,11 @@ pub(crate) fn pack_in_order(scene: &Scene, census: &Census, parts: PartsMut) -> 
     geometries(scene, parts.geometries);
     let mut packer =
         Packer::new(parts.triangle_blocks, parts.sphere_blocks, 0, census.triangle_count);
-    let (triangle_ids, sphere_ids) = parts.prim_ids.split_at_mut(census.triangle_count as usize);
+    let triangle_count = (census.triangle_count as usize).min(parts.prim_ids.len());
+    let (triangle_ids, sphere_ids) = parts.prim_ids.split_at_mut(triangle_count);
     let (mut triangle_ids, mut sphere_ids) = (triangle_ids.iter_mut(), sphere_ids.iter_mut());
     for_each_named_in(scene, 0..u32::MAX, census.ignored_count == 0, |prim, names| {
-        let shape = if census.refit { names.of(prim.shape) } else { prim.shape };
+        let shape = if REFIT && census.refit { names.of(prim.shape) } else { prim.shape };
         let ids = if shape.is_triangle() { &mut triangle_ids } else { &mut sphere_ids };
         if let (Some(id), Some(_)) = (ids.next(), packer.push(&shape)) {
             *id = prim.id;
@@ -83,6 +85,7 @@ impl<'b> Packer<'b> {
     pub fn push(&mut self, shape: &Shape) -> Option<(u32, u32)> {
         match *shape {
             Shape::Triangle(corners) => self.push_triangle(corners),
+            _ if !BALLS => None,
             Shape::Sphere { centre, radius } => self.push_sphere(centre, radius),
             Shape::Box(aabb) => {
                 let (centre, radius) = ball_around(&aabb);
@@ -91,27 +94,24 @@ impl<'b> Packer<'b> {
         }
     }
 
-    /// Adds primitives of one kind, six at the most, as one leaf.
-    pub fn push_leaf(&mut self, shapes: impl Iterator<Item = Shape>) -> Option<LeafRef> {
-        let mut leaf: Option<LeafRef> = None;
-        for shape in shapes {
-            let (block, lane) = self.push(&shape)?;
-            let leaf = leaf.get_or_insert(LeafRef { block, lanes: 0 });
-            // At most one step to the next block: five triangles always fit into it.
-            leaf.lanes |= 1 << (lane + 16 * (block - leaf.block));
-        }
-        leaf
+    /// Adds a primitive to a leaf, in which are then six of one kind at the most.
+    pub fn push_to(&mut self, leaf: &mut Option<LeafRef>, shape: &Shape) -> Option<()> {
+        let (block, lane) = self.push(shape)?;
+        let leaf = leaf.get_or_insert(LeafRef { block, lanes: 0 });
+        // At most one step to the next block: five triangles always fit into it.
+        leaf.lanes |= 1 << (lane + 16 * (block - leaf.block));
+        Some(())
     }
 
     fn push_triangle(&mut self, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
         let fill = &mut self.triangles;
         let open = fill.blocks.checked_sub(1).and_then(|b| self.triangle_blocks.get(b));
         let fits = open.is_some_and(|block| {
-            let known = |v: &&[f32; 3]| self.numbers.find(block, v).is_ok();
+            let known = |v: &[f32; 3]| usize::from(self.numbers.find(block, v).is_ok());
             !fill.closed
                 && (block.count as usize) < TRIANGLES
                 && (fill.vertices + 3 <= TRIANGLES
-                    || fill.vertices + 3 - corners.iter().filter(known).count() <= TRIANGLES)
+                    || fill.vertices + 3 <= TRIANGLES + corners.iter().map(known).sum::<usize>())
         });
         if !fits {
             *self.triangle_blocks.get_mut(fill.blocks)? =
@@ -127,9 +127,9 @@ impl<'b> Packer<'b> {
         for (k, corner) in corners.iter().enumerate() {
             let v = self.numbers.find(block, corner).unwrap_or_else(|place| {
                 let v = fill.vertices;
-                self.numbers.0[place] = v as u8;
+                self.numbers.0[place % 64] = v as u8;
                 for (axis, x) in block.vertices.iter_mut().zip(corner) {
-                    axis[v] = *x;
+                    axis[v % TRIANGLES] = *x;
                 }
                 fill.vertices += 1;
                 v
@@ -154,12 +154,12 @@ impl<'b> Packer<'b> {
         }
         let number = fill.blocks - 1;
         let block = self.sphere_blocks.get_mut(number)?;
-        let lane = block.count as usize;
-        (block.x[lane], block.y[lane], block.z[lane], block.radius[lane]) = (x, y, z, radius);
+        let lane = block.count;
+        block.set_sphere(lane as usize, [x, y, z], radius);
         block.live |= 1 << lane;
         block.count += 1;
         fill.next_id += 1;
-        Some((block_ref(KIND_SPHERES, number as u32), lane as u32))
+        Some((block_ref(KIND_SPHERES, number as u32), lane))
     }
 }
 
@@ -180,7 +180,8 @@ impl Numbers {
     const NONE: Numbers = Numbers([u8::MAX; 64]);
 
     /// The number of a vertex among those of `block`, or the free place of the table for it.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline)]
     fn find(&self, block: &TriangleBlock, vertex: &[f32; 3]) -> Result<usize, usize> {
         let [x, y, z] = vertex.map(f32::to_bits);
         let hash =
@@ -192,7 +193,8 @@ impl Numbers {
             if v >= TRIANGLES {
                 return Err(place % 64);
             }
-            if block.vertices.map(|axis| axis[v].to_bits()) == [x, y, z] {
+            let [xs, ys, zs] = &block.vertices;
+            if [xs[v], ys[v], zs[v]].map(f32::to_bits) == [x, y, z] {
                 return Ok(v);
             }
             place += 1;
@@ -235,9 +237,15 @@ mod tests {
     fn a_leaf_may_straddle_two_blocks() {
         let mut blocks = [TriangleBlock::EMPTY; 2];
         let mut packer = Packer::new(&mut blocks, &mut [], 0, 0);
-        let leaf = |n: usize| (0..n).map(move |i| triangle(3.0 * (i + 10 * n) as f32));
-        let first = packer.push_leaf(leaf(3)).expect("room");
-        let second = packer.push_leaf(leaf(6)).expect("room");
+        let mut leaf = |n: usize| {
+            let mut leaf = None;
+            for i in 0..n {
+                let shape = triangle(3.0 * (i + 10 * n) as f32);
+                packer.push_to(&mut leaf, &shape).expect("room");
+            }
+            leaf.expect("a leaf")
+        };
+        let (first, second) = (leaf(3), leaf(6));
         assert_eq!((first.number(), first.lanes), (0, 0b111));
         assert_eq!((second.number(), second.lanes), (0, 0b1111 << 16 | 0b11000));
     }

@@ -2,6 +2,7 @@
 
 use super::gather::{Shape, sphere};
 use crate::block::Geometry;
+use crate::kinds::{INSTANCES, REFIT, SPHERES};
 use crate::query::geometry_of;
 use crate::scene::{Mesh, Scene};
 use crate::simd::prefetch;
@@ -67,7 +68,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
 
     #[inline]
     fn triangle(&self, first: u32, mesh: &Mesh, i: u32) -> Option<Shape> {
-        if self.source.named {
+        if REFIT && self.source.named {
             return mesh.names(first, i as usize).map(Shape::Triangle);
         }
         mesh.triangle(i as usize).map(Shape::Triangle)
@@ -76,7 +77,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
     #[cold]
     fn find(&mut self, id: u32) -> Option<Shape> {
         let Source { scene, geometries, .. } = self.source;
-        if let Some(boxes) = scene.boxes() {
+        if let Some(boxes) = scene.boxes().filter(|_| INSTANCES) {
             return Some(Shape::Box(boxes.aabb(id as usize)));
         }
         let (number, geometry) = geometry_of(id, geometries)?;
@@ -85,6 +86,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
         self.mesh = scene.mesh(number).map(|mesh| (first, mesh));
         match number.checked_sub(scene.mesh_count()) {
             None => self.triangle(first, &scene.mesh(number)?, prim),
+            Some(_) if !SPHERES => None,
             Some(set) => scene.sphere_set(set)?.sphere(prim as usize).map(sphere),
         }
     }

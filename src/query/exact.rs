@@ -264,13 +264,13 @@ impl Decide for Exact {
     ) -> Option<ExactMet> {
         watch.interval();
         let meeting = match lane.sure {
-            true => triangle::clear_plane(&ray.line(), lane.corners()),
-            false => None,
+            true if !SMALL => triangle::clear_plane(&ray.line(), lane.corners()),
+            _ => None,
         };
         let meeting = match meeting {
             Some(meeting) => meeting,
             None => {
-                let meeting = unclear(ray, *lane)?;
+                let meeting = any_meeting(ray, *lane)?;
                 if meeting.exact {
                     watch.exact();
                 }
@@ -347,12 +347,11 @@ impl Decide for Exact {
     }
 }
 
-/// The meeting with a triangle whose edges the line passes closely, or whose plane it hardly crosses.
+/// The meeting with a triangle, also where the line passes its edges closely or hardly crosses its plane.
 #[inline(never)]
-fn unclear(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
+fn any_meeting(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
     match lane.sure {
-        // The plane was not clear.
-        true => triangle::exact_plane(&ray.line(), lane.corners()),
+        true => triangle::plane(&ray.line(), lane.corners()),
         false => triangle::meet(&ray.line(), lane.corners()),
     }
 }

@@ -21,6 +21,7 @@ pub use options::{Facing, Precision, PrimId, QueryOptions};
 pub(crate) use watertight::Watertight;
 
 use crate::block::leaf::{Place, TriangleBlock};
+use crate::math::float::limited;
 use crate::ray::PreparedRay;
 use crate::sieve::SphereDetail;
 
@@ -240,9 +241,8 @@ pub(crate) trait Meets {
 }
 
 /// The part of `[0, 1]` in which weights lie: neither they nor `1 - u - v` are negative; `v` gives way.
-#[expect(clippy::manual_clamp, reason = "`clamp` panics on the NaN that foreign blocks can give")]
 pub(crate) fn clamped_weights([u, v]: [f32; 2]) -> [f32; 2] {
-    let u = u.max(0.0).min(1.0) + 0.0;
-    let v = v.max(0.0).min(1.0 - u) + 0.0;
+    let u = limited(u, 0.0, 1.0) + 0.0;
+    let v = limited(v, 0.0, 1.0 - u) + 0.0;
     [u, v]
 }

@@ -2,6 +2,7 @@
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
 use crate::block::leaf::Place;
+use crate::math::float::limited;
 use crate::ray::PreparedRay;
 use crate::sieve;
 
@@ -54,7 +55,7 @@ impl Decide for Watertight {
             return None;
         }
         Some(WatertightMet {
-            t: limited(ray, detail.t),
+            t: limited(detail.t, ray.t_min, ray.t_max),
             weights: detail.weights,
             place: lane.place,
             front: detail.front,
@@ -76,7 +77,7 @@ impl Decide for Watertight {
                 return None;
             }
             Some(WatertightMet {
-                t: limited(ray, t),
+                t: limited(t, ray.t_min, ray.t_max),
                 weights: [0.0; 2],
                 place: lane.place,
                 front: Some(root == 0),
@@ -108,19 +109,10 @@ impl Decide for Watertight {
 
     fn t(ray: &PreparedRay, met: &WatertightMet, _: &mut impl Watch) -> f32 {
         // Out of the frame; what rounding at the limits moved goes back between them.
-        limit(ray.given_t(met.t), ray.given.t_min, ray.given.t_max) + 0.0
+        limited(ray.given_t(met.t), ray.given.t_min, ray.given.t_max) + 0.0
     }
 
     fn weights(met: &WatertightMet) -> [f32; 2] {
         clamped_weights(met.weights)
     }
-}
-
-fn limited(ray: &PreparedRay, t: f32) -> f32 {
-    limit(t, ray.t_min, ray.t_max)
-}
-
-/// `t` between the limits; NaN becomes the lower one.
-fn limit(t: f32, t_min: f32, t_max: f32) -> f32 {
-    t.max(t_min).min(t_max)
 }

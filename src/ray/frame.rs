@@ -61,7 +61,8 @@ pub(crate) const TINY: f32 = 1.0 / (1u128 << 100) as f32;
 #[inline(always)]
 fn depth_slack(depth: f32) -> f32 {
     // Infinite depths stay as they are.
-    depth.abs().min(f32::MAX) * DEPTH_SLACK + TINY
+    let size = if depth.abs() < f32::MAX { depth.abs() } else { f32::MAX };
+    size * DEPTH_SLACK + TINY
 }
 
 pub(super) const DEPTH_SLACK: f32 = 4.0 * UNIT32;
@@ -106,6 +107,7 @@ pub(super) fn scale_below(x: f32) -> f32 {
 
 /// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
 /// infinities and NaN above the others.
+#[cfg_attr(target_os = "none", inline(never))]
 pub(super) fn largest_bits(v: [f32; 3]) -> u32 {
     let [x, y, z] = v.map(|x| x.to_bits() & !(1 << 31));
     x.max(y).max(z)

@@ -225,7 +225,8 @@ impl FrameSlab {
         let PreparedRay { given, scale, origin, direction, .. } = ray;
         let [x, y, z, _] = *direction;
         let slowest = largest([x, y, z]) * SLOWEST;
-        let reach = larger(larger(0.0, reach.min(f32::MAX)), largest(given.origin));
+        let reach = if reach < f32::MAX { larger(0.0, reach) } else { f32::MAX };
+        let reach = larger(reach, largest(given.origin));
         let is_ordinary = is_ordinary(reach);
         let scales = Scales { t: 1.0, space: 1.0 };
         let mut narrow = NarrowSlab { t_min: ray.t_min, ..NarrowSlab::BLANK };

@@ -7,6 +7,7 @@ use super::meetings::Middle;
 use super::triangle::{One, sheared};
 use super::vector::{cross, dot, sum_abs};
 use crate::math::Aabb;
+use crate::math::float::limited;
 use crate::math::rounding::UNIT32;
 use crate::ray::{PreparedRay, TINY};
 
@@ -34,7 +35,7 @@ pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetai
     let [nearest, farthest] = extremes([a.0, b.0, c.0]);
     let rate = ray.shear.depth_rate;
     TriangleDetail {
-        t: (t * rate).max(nearest).min(farthest) / rate,
+        t: limited(t * rate, nearest, farthest) / rate,
         t_error,
         weights: [over_b / total, over_c / total],
         front: Some(front),
@@ -54,7 +55,7 @@ fn edge_on(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
     // The total carries the errors of three areas, and less than as much again of its own.
     let is_clear = size_of_total > 6.0 * area_error;
     // A NaN, from 0 / 0, loses to the depths of the vertices.
-    let depth = (middle.depth[0] + rise / size_of_total).max(nearest).min(farthest);
+    let depth = limited(middle.depth[0] + rise / size_of_total, nearest, farthest);
     TriangleDetail {
         t: depth / ray.shear.depth_rate,
         t_error: f32::INFINITY,
@@ -71,7 +72,8 @@ fn over([a, b, c]: [&Across<[f32; 1]>; 3]) -> [f32; 3] {
 /// The least and the largest depth of three vertices.
 fn extremes(along: [Along<[f32; 1]>; 3]) -> [f32; 2] {
     let [a, b, c] = along.map(|v| v.depth[0]);
-    [a.min(b).min(c), a.max(b).max(c)]
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    [if low < c { low } else { c }, if high > c { high } else { c }]
 }
 
 /// Where the ray meets the plane of a triangle, in the frame, and a bound on the error of that.

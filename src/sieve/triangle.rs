@@ -172,8 +172,8 @@ impl<'a> Single<'a> {
     /// `None` for a lane that is not left.
     #[inline(never)]
     pub fn look(&self, lane: u32) -> Option<Left> {
-        let corners = Corners::new(self.ray, &self.middle, self.block.triangle(lane as usize));
-        let areas = corners.areas(self.ray, &self.middle);
+        let corners = self.block.triangle(lane as usize);
+        let (corners, areas) = Corners::and_areas(self.ray, &self.middle, corners);
         if areas.outside(Scalar) != 0 {
             return None;
         }
@@ -193,28 +193,31 @@ impl<'a> Single<'a> {
 
 /// The corners of one triangle in the sheared space.
 struct Corners {
-    across: [Across<[f32; 1]>; 3],
     /// From the middle of a box that holds it.
     depths: [[f32; 1]; 3],
 }
 
 impl Corners {
-    #[inline(always)]
-    fn new(ray: &PreparedRay, middle: &Middle<[f32; 1]>, corners: [[f32; 3]; 3]) -> Self {
+    /// The corners, and the areas that the ray has over each.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    fn and_areas(
+        ray: &PreparedRay,
+        middle: &Middle<[f32; 1]>,
+        corners: [[f32; 3]; 3],
+    ) -> (Self, Areas<[f32; 1]>) {
         let corners = corners.map(|v| sheared(ray, v));
         let depths = corners.map(|v| [v.0.raw[0] - middle.raw]);
-        Corners { across: corners.map(|v| v.1), depths }
-    }
-
-    #[inline(always)]
-    fn areas(&self, ray: &PreparedRay, middle: &Middle<[f32; 1]>) -> Areas<[f32; 1]> {
-        let [a, b, c] = [self.across[0].size(), self.across[1].size(), self.across[2].size()];
+        let across = corners.map(|v| v.1);
+        let [a, b, c] = [across[0].size(), across[1].size(), across[2].size()];
         let error = AreaError::new(Scalar, [shared_error(ray, middle.deepest[0])]);
         let error = error.of::<Scalar, false, 1>(Scalar, a.max(b).max(c));
-        Areas::new::<false, 1>(&self.across, error)
+        let areas = Areas::new::<false, 1>(&across, error);
+        (Corners { depths }, areas)
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     fn meetings(&self, middle: &Middle<[f32; 1]>, areas: &Areas<[f32; 1]>) -> Meetings<[f32; 1]> {
         Meetings::new::<Scalar, false, 1>(Scalar, middle.half, areas, self.depths)
     }
@@ -230,8 +233,7 @@ impl One {
     /// For a box that holds it.
     #[inline(always)]
     pub fn new(ray: &PreparedRay, middle: &Middle<[f32; 1]>, corners: [[f32; 3]; 3]) -> One {
-        let corners = Corners::new(ray, middle, corners);
-        let areas = corners.areas(ray, middle);
+        let (corners, areas) = Corners::and_areas(ray, middle, corners);
         let meetings = corners.meetings(middle, &areas);
         One { areas, meetings }
     }

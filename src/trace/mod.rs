@@ -100,6 +100,7 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
 fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
     let block = &block.parts();
     let reach = block.header.reach;
+    // Where it is: a copy would be another kind of call, and twice the room.
     let mut prepared = ray.prepare_any(reach);
     let Some(ray) = &prepared else { return Q::nothing() };
     let mut query = question.query(block, ray.t_max);
