@@ -5,6 +5,7 @@
 
 #[cfg(test)]
 mod bounds;
+mod list;
 mod nested;
 mod options;
 mod overlap;
@@ -22,6 +23,7 @@ pub(crate) use validate::grids_are_sound;
 pub(crate) use walk::{Cells, walk};
 
 use crate::block::Census;
+use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::prim::Survey;
 use crate::scene::Scene;
@@ -32,9 +34,10 @@ pub(crate) fn needs(
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
+    caller: &Caller,
 ) -> Result<(usize, usize), BuildError> {
     match options.kind {
-        GridKind::Uniform => uniform::needs(scene, survey, census, options),
+        GridKind::Uniform => uniform::needs(scene, survey, census, options, caller),
         GridKind::Nested | GridKind::Octree => nested::needs(survey, census),
     }
 }
@@ -46,11 +49,14 @@ pub(crate) fn build(
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
+    caller: &Caller,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
     match options.kind {
-        GridKind::Uniform => uniform::build(scene, survey, census, options, bytes),
-        GridKind::Nested | GridKind::Octree => nested::build(scene, survey, census, options, bytes),
+        GridKind::Uniform => uniform::build(scene, survey, census, options, caller, bytes),
+        GridKind::Nested | GridKind::Octree => {
+            nested::build(scene, survey, census, options, caller, bytes)
+        }
     }
 }
 

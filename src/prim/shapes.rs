@@ -31,10 +31,6 @@ pub(crate) struct Shapes<'s, 'a> {
 }
 
 impl<'s, 'a> Shapes<'s, 'a> {
-    pub fn new(scene: &'s Scene<'a, 'a>, geometries: &'s [Geometry]) -> Self {
-        Source { scene, geometries, named: false }.shapes()
-    }
-
     /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
     #[inline]
     pub fn prefetch(&self, id: u32) {
