@@ -248,6 +248,8 @@ fn part<T: Plain>(bytes: &mut [u8], count: u32, size: usize) -> Option<(&mut [T]
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Census {
     pub bounds: Aabb,
+    /// The longest edge of a primitive's box, rounded.
+    pub longest: f32,
     pub mesh_count: u32,
     pub triangle_limit: u32,
     pub prim_limit: u32,

@@ -31,6 +31,18 @@ pub(crate) struct Shapes<'s, 'a> {
 }
 
 impl<'s, 'a> Shapes<'s, 'a> {
+    /// Has shapes fetched that come soon: first the indices, then what they name. `next` gives the number of the shape
+    /// that comes so many later.
+    #[inline]
+    pub fn look_ahead(&self, next: impl Fn(usize) -> Option<u32>) {
+        if let Some(id) = next(2 * AHEAD) {
+            self.prefetch(id);
+        }
+        if let Some(id) = next(AHEAD) {
+            self.prefetch_vertices(id);
+        }
+    }
+
     /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
     #[inline]
     pub fn prefetch(&self, id: u32) {

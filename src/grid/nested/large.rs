@@ -11,6 +11,8 @@ use core::ops::Range;
 /// At most so many, which are one block whatever vertices they share, and only those longer than this part of the scene.
 const MOST: usize = TRIANGLES_AT_LEAST;
 const LONG: f64 = 0.1;
+/// What a length may have lost by rounding.
+const ROUNDED: f64 = 1.0 + 1.0 / (1u64 << 22) as f64;
 
 /// The largest primitives: tested by every ray that meets the box around them, and in no other cell.
 ///
@@ -36,6 +38,10 @@ impl Large {
     pub fn find(scene: &Scene, census: &Census, caller: &Caller) -> Self {
         let least = length(&census.bounds) * LONG;
         let mut found = Large::NONE;
+        if f64::from(census.longest) * ROUNDED < least {
+            found.bounds[1] = census.bounds;
+            return found;
+        }
         let parts = in_parts(scene, census, caller, |part, prim| {
             let length = length(&prim.shape.aabb());
             if length > least {

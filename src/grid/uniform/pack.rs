@@ -3,7 +3,7 @@
 use super::front;
 use crate::block::leaf::{SPHERES, SphereBlock, TRIANGLES_AT_LEAST, TriangleBlock};
 use crate::caller::{Caller, PARTS};
-use crate::prim::{AHEAD, GRAIN, Packer, Source};
+use crate::prim::{GRAIN, Packer, Source};
 
 /// So many primitives begin with a block of their own, so that they are packed alike on any thread.
 const CHUNK: usize = GRAIN;
@@ -89,9 +89,7 @@ impl Part<'_, TriangleBlock> {
             let first = (self.first + i * CHUNK) as u32;
             let mut packer = Packer::new(self.blocks.get_mut(used..)?, &mut [], first, 0);
             for (i, id) in ids.iter().enumerate() {
-                if let Some(id) = ids.get(i + AHEAD) {
-                    shapes.prefetch(*id);
-                }
+                shapes.look_ahead(|ahead| ids.get(i + ahead).copied());
                 packer.push(&shapes.get(*id)?)?;
             }
             used += packer.triangle_block_count();

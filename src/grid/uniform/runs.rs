@@ -158,6 +158,10 @@ impl Blocks<'_> {
             let reaches = |range: &Range| range.first[axis] <= i && i <= range.last[axis];
             ranges.iter().rev().fold(0u32, |lanes, range| lanes << 1 | u32::from(reaches(range)))
         };
+        let mut along_x = [0; 16];
+        for (x, lanes) in (all.first[0]..=all.last[0]).zip(&mut along_x) {
+            *lanes = lanes_with(0, x);
+        }
         let ny = space.resolution[1];
         for z in all.first[2]..=all.last[2] {
             let in_z = lanes_with(2, z);
@@ -166,8 +170,8 @@ impl Blocks<'_> {
                 if in_yz == 0 || !rows.contains(&(y + ny * z)) {
                     continue;
                 }
-                for x in all.first[0]..=all.last[0] {
-                    let lanes = in_yz & lanes_with(0, x);
+                for (i, x) in (all.first[0]..=all.last[0]).enumerate() {
+                    let lanes = in_yz & along_x.get(i).map_or_else(|| lanes_with(0, x), |x| *x);
                     if lanes != 0 {
                         f(space.number([x, y, z]), lanes);
                     }
