@@ -191,6 +191,7 @@ struct Plan {
     structure: Structure,
     size: usize,
     minimum: usize,
+    grid: Option<grid::Needs>,
 }
 
 /// The instances of a scene, and the index over them.
@@ -230,14 +231,19 @@ impl Plan {
             asked => asked,
         };
         let census = if matches!(structure, Structure::Grid(_)) { census } else { kept };
+        let mut planned = None;
         let (size, minimum) = match structure {
             Structure::List => list::needs(&survey, &census)?,
-            Structure::Grid(grid) if GRID => grid::needs(scene, &survey, &census, &grid, &caller)?,
+            Structure::Grid(grid) if GRID => {
+                let needs = grid::needs(scene, &survey, &census, &grid, &caller)?;
+                planned = Some(needs);
+                (needs.size, needs.minimum)
+            }
             Structure::Bvh | Structure::Automatic => bvh::needs(&survey, &census)?,
             Structure::Wide(width) if WIDE => bvh::needs_wide(&survey, &census, width)?,
             Structure::Grid(_) | Structure::Wide(_) => return Err(BuildError::LeftOut),
         };
-        Ok(Plan { survey, census, structure, size, minimum })
+        Ok(Plan { survey, census, structure, size, minimum, grid: planned })
     }
 
     /// Builds into zero bytes, aligned and at least the minimum; returns the size of the block.
@@ -258,7 +264,8 @@ impl Plan {
         match self.structure {
             Structure::List => list::build(scene, survey, census, bytes),
             Structure::Grid(grid) if GRID => {
-                grid::build(scene, survey, census, &grid, caller, bytes)
+                let needs = self.grid.as_ref().ok_or(BuildError::LeftOut)?;
+                grid::build(scene, survey, census, &grid, needs, caller, bytes)
             }
             Structure::Bvh | Structure::Automatic => bvh::build(scene, survey, census, &how, bytes),
             Structure::Wide(width) if WIDE => {

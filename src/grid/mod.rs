@@ -28,17 +28,29 @@ use crate::error::BuildError;
 use crate::prim::Survey;
 use crate::scene::Scene;
 
-/// The bytes for the grid that the options ask for, and the bytes below which there is none.
+/// How much memory a grid wants, and what was found out for that.
+#[derive(Clone, Copy)]
+pub(crate) struct Needs {
+    /// The bytes for the grid that the options ask for, and the bytes below which there is none.
+    pub size: usize,
+    pub minimum: usize,
+    plan: Option<uniform::Plan>,
+}
+
+/// How much memory the grid that the options ask for wants.
 pub(crate) fn needs(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
     caller: &Caller,
-) -> Result<(usize, usize), BuildError> {
+) -> Result<Needs, BuildError> {
     match options.kind {
         GridKind::Uniform => uniform::needs(scene, survey, census, options, caller),
-        GridKind::Nested | GridKind::Octree => nested::needs(survey, census),
+        GridKind::Nested | GridKind::Octree => {
+            let (size, minimum) = nested::needs(survey, census)?;
+            Ok(Needs { size, minimum, plan: None })
+        }
     }
 }
 
@@ -49,11 +61,19 @@ pub(crate) fn build(
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
+    needs: &Needs,
     caller: &Caller,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
     match options.kind {
-        GridKind::Uniform => uniform::build(scene, survey, census, options, caller, bytes),
+        GridKind::Uniform => match needs.plan.filter(|plan| plan.size <= bytes.len()) {
+            Some(plan) => uniform::build(scene, census, &plan, caller, bytes),
+            None => {
+                let limit = bytes.len();
+                let plan = uniform::Plan::finest(scene, survey, census, options, caller, limit)?;
+                uniform::build(scene, census, &plan, caller, bytes)
+            }
+        },
         GridKind::Nested | GridKind::Octree => {
             nested::build(scene, survey, census, options, caller, bytes)
         }

@@ -5,6 +5,7 @@ mod plan;
 mod runs;
 mod sort;
 
+use super::Needs;
 use super::options::GridOptions;
 use crate::block::cells::resolution_word;
 use crate::block::{Census, Counts, KIND_GRID, LAYOUT_COMPACT, PartsMut};
@@ -13,37 +14,36 @@ use crate::error::BuildError;
 use crate::prim::{Source, Survey, geometries};
 use crate::scene::Scene;
 use core::mem::take;
-use plan::Plan;
+pub(super) use plan::Plan;
 use sort::Sorter;
 
-/// The bytes for the grid that the rule wants, and the bytes below which there is none.
+/// The memory for the grid that the rule wants, and its plan.
 pub(crate) fn needs(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
     caller: &Caller,
-) -> Result<(usize, usize), BuildError> {
+) -> Result<Needs, BuildError> {
     let finest = Plan::finest(scene, survey, census, options, caller, usize::MAX)?;
     let coarsest = Plan::coarsest(scene, survey, census, caller)?;
-    Ok((finest.size, coarsest.size.min(finest.size)))
+    let minimum = coarsest.size.min(finest.size);
+    Ok(Needs { size: finest.size, minimum, plan: Some(finest) })
 }
 
-/// Builds into `bytes`, which are at least the minimum of [`needs`]; returns the size of the
+/// Builds into `bytes`, which are at least what is planned; returns the size of the
 /// finished block. At least one primitive can be hit.
 ///
 /// Each primitive is stored once: they are sorted by the cell of their centre and packed into leaf
 /// blocks in that order, and a cell's run names the lanes of all blocks that are in it.
 pub(crate) fn build(
     scene: &Scene,
-    survey: &Survey,
     census: &Census,
-    options: &GridOptions,
+    plan: &Plan,
     caller: &Caller,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
-    let plan = Plan::finest(scene, survey, census, options, caller, bytes.len())?;
-    match build_as_planned(scene, census, &plan, caller, bytes) {
+    match build_as_planned(scene, census, plan, caller, bytes) {
         Some(size) => Ok(size),
         None if caller.cancelled() => Err(BuildError::Cancelled),
         None => Err(BuildError::OutOfMemory { minimum: plan.size }),

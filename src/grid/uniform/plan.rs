@@ -19,6 +19,7 @@ const REFERENCES_PER_PRIM: u64 = 32;
 const REFERENCES_AT_LEAST: u64 = 4096;
 
 /// A grid that was not built yet.
+#[derive(Clone, Copy)]
 pub(crate) struct Plan {
     pub space: Space,
     /// Sizes of the parts, with room for the most triangle blocks and runs there can be.
