@@ -1,4 +1,4 @@
-// Builds in every quality, on the caller's threads, watched and cancelled: the same bytes each time.
+// Builds in every quality and of every kind of grid, on the caller's threads, watched and cancelled: the same bytes each time.
 
 #include "check.h"
 
@@ -119,22 +119,24 @@ int main(void) {
     check_choice();
     const uint32_t qualities[3] = {RT_QUALITY_FAST, RT_QUALITY_BALANCED, RT_QUALITY_BEST};
     Crew crew = {.lock = PTHREAD_MUTEX_INITIALIZER};
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 9; i++) {
+        bool grid = i >= 6;
         RtBuildOptions options = {0};
         options.struct_size = sizeof options;
-        options.quality = qualities[i / 2];
-        options.refit = i % 2;
-        const RtAccel *alone = built(&scene, false, &options);
+        options.quality = qualities[i / 2 % 3];
+        options.refit = !grid && i % 2;
+        options.grid_kind = (uint32_t)i % 3;
+        const RtAccel *alone = built(&scene, grid, &options);
         options.user = &crew;
         options.parallel_for = parallel_for;
         options.worker_count = 1;
         crew.ran = 0;
-        built(&scene, false, &options);
+        built(&scene, grid, &options);
         CHECK(crew.ran == 0);
         for (crew.workers = 2; crew.workers <= WORKERS; crew.workers += 3) {
             options.worker_count = crew.workers;
             crew.ran = 0;
-            const RtAccel *together = built(&scene, false, &options);
+            const RtAccel *together = built(&scene, grid, &options);
             CHECK(crew.ran > 4);
             CHECK(rt_accel_size(alone) == rt_accel_size(together));
             CHECK(memcmp(alone, together, rt_accel_size(alone)) == 0);
@@ -144,13 +146,13 @@ int main(void) {
         // Cancelled at each call, in the same memory, which then takes a build.
         options.progress = progress;
         RtMemory need;
-        CHECK(rt_bvh_needs(&scene, &options, &need) == RT_OK);
+        CHECK((grid ? rt_grid_needs : rt_bvh_needs)(&scene, &options, &need) == RT_OK);
         unsigned char *memory = aligned(need.size);
         const RtAccel *out = NULL;
         for (allowed = 0;; allowed++) {
             calls = 0;
             told = 0.0f;
-            RtStatus status = rt_build_bvh(&scene, &options, memory, need.size, &out);
+            RtStatus status = (grid ? rt_build_grid : rt_build_bvh)(&scene, &options, memory, need.size, &out);
             CHECK(calls >= 1);
             if (status == RT_OK) break;
             CHECK(status == RT_ERROR_CANCELLED && calls == allowed + 1 && out == NULL);

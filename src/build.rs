@@ -72,8 +72,7 @@ pub struct BuildOptions<'a> {
     pub grid: GridOptions,
     /// For [`build`], how many rays for each primitive will be traced before the next build; zero means many.
     pub rays_per_prim: f32,
-    /// Threads that the build may use, and its `needs`; none of them is kept. They check the scene and build a BVH; a grid
-    /// is built by the caller's own.
+    /// Threads that the build may use, and its `needs`; none of them is kept.
     pub threads: Option<&'a dyn Threads>,
     /// Told how far the build is, from 0 to 1, on the thread that builds; false cancels it. It is
     /// asked a few times a build, not at equal times.
@@ -192,6 +191,7 @@ struct Plan {
     structure: Structure,
     size: usize,
     minimum: usize,
+    grid: Option<grid::Needs>,
 }
 
 /// The instances of a scene, and the index over them.
@@ -214,7 +214,8 @@ impl Plan {
         if !SPHERES && scene.boxes().is_none() && survey.prim_limit != survey.triangle_limit {
             return Err(BuildError::LeftOut);
         }
-        let census = Census::take(scene, &survey, &Caller::new(options.threads, None))?;
+        let caller = Caller::new(options.threads, None);
+        let census = Census::take(scene, &survey, &caller)?;
         // Instances are not refitted: their index is built anew.
         let asked_to = REFIT && options.refit;
         let refit = asked_to && scene.instance_count() == 0 && scene.boxes().is_none();
@@ -230,14 +231,19 @@ impl Plan {
             asked => asked,
         };
         let census = if matches!(structure, Structure::Grid(_)) { census } else { kept };
+        let mut planned = None;
         let (size, minimum) = match structure {
             Structure::List => list::needs(&survey, &census)?,
-            Structure::Grid(grid) if GRID => grid::needs(scene, &survey, &census, &grid)?,
+            Structure::Grid(grid) if GRID => {
+                let needs = grid::needs(scene, &survey, &census, &grid, &caller)?;
+                planned = Some(needs);
+                (needs.size, needs.minimum)
+            }
             Structure::Bvh | Structure::Automatic => bvh::needs(&survey, &census)?,
             Structure::Wide(width) if WIDE => bvh::needs_wide(&survey, &census, width)?,
             Structure::Grid(_) | Structure::Wide(_) => return Err(BuildError::LeftOut),
         };
-        Ok(Plan { survey, census, structure, size, minimum })
+        Ok(Plan { survey, census, structure, size, minimum, grid: planned })
     }
 
     /// Builds into zero bytes, aligned and at least the minimum; returns the size of the block.
@@ -257,7 +263,10 @@ impl Plan {
         let how = How { effort, caller };
         match self.structure {
             Structure::List => list::build(scene, survey, census, bytes),
-            Structure::Grid(grid) if GRID => grid::build(scene, survey, census, &grid, bytes),
+            Structure::Grid(grid) if GRID => {
+                let needs = self.grid.as_ref().ok_or(BuildError::LeftOut)?;
+                grid::build(scene, survey, census, &grid, needs, caller, bytes)
+            }
             Structure::Bvh | Structure::Automatic => bvh::build(scene, survey, census, &how, bytes),
             Structure::Wide(width) if WIDE => {
                 bvh::build_wide(scene, survey, census, width, &how, bytes)

@@ -58,6 +58,11 @@ impl<'a> Caller<'a> {
         count.next_multiple_of(grain).max(grain)
     }
 
+    /// How many tasks run at once, at most [`PARTS`].
+    pub fn worker_count(&self) -> usize {
+        self.threads.map_or(1, |threads| threads.worker_count().min(PARTS))
+    }
+
     /// A good number of parts for the threads there are, at most [`PARTS`].
     pub fn part_count(&self) -> usize {
         self.threads().map_or(1, |threads| threads.worker_count().saturating_mul(4).min(PARTS))

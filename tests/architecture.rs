@@ -34,7 +34,10 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("list", &["block", "error", "prim", "scene"]),
     (
         "grid",
-        &["block", "error", "math", "point", "prim", "query", "ray", "scene", "simd", "storage"],
+        &[
+            "block", "caller", "error", "math", "point", "prim", "query", "ray", "scene", "simd",
+            "storage",
+        ],
     ),
     (
         "bvh",

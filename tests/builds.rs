@@ -9,7 +9,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use common::{bits, odd_models};
 use raykern::{
-    Accel, BuildError, BuildOptions, Kind, Layout, OwnedAccel, PlainList, Quality, Scene, Threads,
+    Accel, BuildError, BuildOptions, GridKind, GridOptions, Kind, Layout, OwnedAccel, PlainList,
+    Quality, Scene, Threads,
 };
 use raykern_harness::make;
 use raykern_harness::model::Model;
@@ -52,7 +53,11 @@ impl Threads for Crew {
 }
 
 fn block(model: &Model, options: &BuildOptions) -> Vec<u8> {
-    let built = model.with_scene(|scene| OwnedAccel::bvh(scene, options)).expect("a BVH");
+    block_of(OwnedAccel::bvh, model, options)
+}
+
+fn block_of(build: Build, model: &Model, options: &BuildOptions) -> Vec<u8> {
+    let built = model.with_scene(|scene| build(scene, options)).expect("a structure");
     built.accel().block().to_vec()
 }
 
@@ -86,6 +91,65 @@ fn the_number_of_threads_changes_no_byte() {
         }
     }
     assert!(most_tasks > 8, "{most_tasks} tasks: nothing ran at the same time");
+}
+
+const GRIDS: [GridKind; 3] = [GridKind::Uniform, GridKind::Nested, GridKind::Octree];
+
+fn grid_options(kind: GridKind) -> BuildOptions<'static> {
+    let grid = GridOptions { kind, ..GridOptions::default() };
+    BuildOptions { grid, plain_list: PlainList::Never, ..BuildOptions::default() }
+}
+
+#[test]
+fn the_number_of_threads_changes_no_byte_of_a_grid() {
+    for kind in GRIDS {
+        let mut most_tasks = 0;
+        for (name, model) in models() {
+            let alone = block_of(OwnedAccel::grid, &model, &grid_options(kind));
+            for workers in [1, 2, 3, 8] {
+                let crew = Crew::of(workers);
+                let options = BuildOptions { threads: Some(&crew), ..grid_options(kind) };
+                let together = block_of(OwnedAccel::grid, &model, &options);
+                assert!(alone == together, "{name} {kind:?} {workers}");
+                let tasks = crew.tasks.into_inner();
+                assert!(workers > 1 || tasks == 0, "one thread lends nothing");
+                most_tasks = most_tasks.max(tasks);
+            }
+        }
+        assert!(most_tasks > 8, "{kind:?}: {most_tasks} tasks: nothing ran at the same time");
+    }
+}
+
+/// Where memory is short a build by one thread divides what it comes to first, and leaves the rest whole.
+#[test]
+fn nor_of_one_in_little_memory() {
+    let crew = Crew::of(3);
+    let mut blocks = std::collections::BTreeSet::new();
+    for name in ["architecture", "hair", "blob"] {
+        let (_, make) = make::ALL.into_iter().find(|(known, _)| *known == name).expect(name);
+        let model = make(20_000);
+        for (kind, step) in GRIDS.into_iter().flat_map(|kind| (0..8).map(move |step| (kind, step)))
+        {
+            let alone = in_part_of_memory(&model, &grid_options(kind), step);
+            let options = BuildOptions { threads: Some(&crew), ..grid_options(kind) };
+            let together = in_part_of_memory(&model, &options, step);
+            assert!(alone == together, "{name} {kind:?} {step}");
+            blocks.insert(alone);
+        }
+    }
+    assert!(blocks.len() > 40, "only {} blocks differ", blocks.len());
+}
+
+/// The block of a grid that is given the minimum of memory and some eighths of what it would like more.
+fn in_part_of_memory(model: &Model, options: &BuildOptions, eighths: usize) -> Vec<u8> {
+    model.with_scene(|scene| {
+        let needs = raykern::grid_needs(scene, options).expect("a size");
+        let size = needs.minimum + (needs.size - needs.minimum) * eighths / 8;
+        let mut memory = vec![std::mem::MaybeUninit::new(0xa5u8); size + 64];
+        let start = memory.as_ptr().align_offset(64);
+        let built = raykern::build_grid(scene, options, &mut memory[start..start + size]);
+        built.expect("enough").block().to_vec()
+    })
 }
 
 #[test]
@@ -205,12 +269,18 @@ type Build = for<'c> fn(&Scene<'_, 'c>, &BuildOptions) -> Result<OwnedAccel<'c>,
 #[test]
 fn progress_is_told_and_may_cancel() {
     let model: Model = make::blob(5_000, 1).into();
-    let builds: [(Build, Layout); 3] = [
-        (OwnedAccel::bvh, Layout::Wide(16)),
-        (OwnedAccel::bvh, Layout::Compact),
-        (OwnedAccel::grid, Layout::Automatic),
+    let crew = Crew::of(2);
+    let bvh = |layout| options(Quality::Balanced, layout);
+    let together = |kind| BuildOptions { threads: Some(&crew), ..grid_options(kind) };
+    let builds: [(Build, BuildOptions); 6] = [
+        (OwnedAccel::bvh, bvh(Layout::Wide(16))),
+        (OwnedAccel::bvh, bvh(Layout::Compact)),
+        (OwnedAccel::grid, grid_options(GridKind::Nested)),
+        (OwnedAccel::grid, grid_options(GridKind::Uniform)),
+        (OwnedAccel::grid, together(GridKind::Nested)),
+        (OwnedAccel::grid, together(GridKind::Uniform)),
     ];
-    for (build, layout) in builds {
+    for (build, options) in builds {
         let told = RefCell::new(Vec::new());
         let watched = |most: usize| {
             told.borrow_mut().clear();
@@ -218,8 +288,7 @@ fn progress_is_told_and_may_cancel() {
                 told.borrow_mut().push(done);
                 told.borrow().len() < most
             };
-            let options =
-                BuildOptions { progress: Some(&progress), ..options(Quality::Balanced, layout) };
+            let options = BuildOptions { progress: Some(&progress), ..options };
             model
                 .with_scene(|scene| build(scene, &options))
                 .map(|built| built.accel().block().len())
@@ -227,10 +296,10 @@ fn progress_is_told_and_may_cancel() {
         assert!(watched(usize::MAX).is_ok());
         let all = told.borrow().clone();
         assert_eq!((all.first(), all.last()), (Some(&0.0), Some(&1.0)));
-        assert!(all.is_sorted(), "{all:?}");
+        assert!(all.is_sorted() && all.len() > 3, "{options:?} {all:?}");
         for most in 1..=all.len() {
-            assert_eq!(watched(most), Err(BuildError::Cancelled), "{layout:?} {most}");
-            assert_eq!(told.borrow()[..], all[..most], "{layout:?}: asked after it said no");
+            assert_eq!(watched(most), Err(BuildError::Cancelled), "{options:?} {most}");
+            assert_eq!(told.borrow()[..], all[..most], "{options:?}: asked after it said no");
         }
     }
 }

@@ -272,6 +272,8 @@ fn part_if<T: Plain>(
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Census {
     pub bounds: Aabb,
+    /// The longest edge of a primitive's box, rounded.
+    pub longest: f32,
     pub mesh_count: u32,
     pub triangle_limit: u32,
     pub prim_limit: u32,

@@ -5,6 +5,7 @@
 
 #[cfg(test)]
 mod bounds;
+mod list;
 mod nested;
 mod options;
 mod overlap;
@@ -22,20 +23,34 @@ pub(crate) use validate::grids_are_sound;
 pub(crate) use walk::{Cells, walk};
 
 use crate::block::Census;
+use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::prim::Survey;
 use crate::scene::Scene;
 
-/// The bytes for the grid that the options ask for, and the bytes below which there is none.
+/// How much memory a grid wants, and what was found out for that.
+#[derive(Clone, Copy)]
+pub(crate) struct Needs {
+    /// The bytes for the grid that the options ask for, and the bytes below which there is none.
+    pub size: usize,
+    pub minimum: usize,
+    plan: Option<uniform::Plan>,
+}
+
+/// How much memory the grid that the options ask for wants.
 pub(crate) fn needs(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
-) -> Result<(usize, usize), BuildError> {
+    caller: &Caller,
+) -> Result<Needs, BuildError> {
     match options.kind {
-        GridKind::Uniform => uniform::needs(scene, survey, census, options),
-        GridKind::Nested | GridKind::Octree => nested::needs(survey, census),
+        GridKind::Uniform => uniform::needs(scene, survey, census, options, caller),
+        GridKind::Nested | GridKind::Octree => {
+            let (size, minimum) = nested::needs(survey, census)?;
+            Ok(Needs { size, minimum, plan: None })
+        }
     }
 }
 
@@ -46,11 +61,22 @@ pub(crate) fn build(
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
+    needs: &Needs,
+    caller: &Caller,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
     match options.kind {
-        GridKind::Uniform => uniform::build(scene, survey, census, options, bytes),
-        GridKind::Nested | GridKind::Octree => nested::build(scene, survey, census, options, bytes),
+        GridKind::Uniform => match needs.plan.filter(|plan| plan.size <= bytes.len()) {
+            Some(plan) => uniform::build(scene, census, &plan, caller, bytes),
+            None => {
+                let limit = bytes.len();
+                let plan = uniform::Plan::finest(scene, survey, census, options, caller, limit)?;
+                uniform::build(scene, census, &plan, caller, bytes)
+            }
+        },
+        GridKind::Nested | GridKind::Octree => {
+            nested::build(scene, survey, census, options, caller, bytes)
+        }
     }
 }
 

@@ -289,6 +289,7 @@ impl Census {
     pub fn take(scene: &Scene, survey: &Survey, caller: &Caller) -> Result<Census, BuildError> {
         let mut census = Census {
             bounds: Aabb::EMPTY,
+            longest: 0.0,
             mesh_count: survey.mesh_count,
             triangle_limit: survey.triangle_limit,
             prim_limit: survey.prim_limit,
@@ -323,7 +324,11 @@ impl Census {
         let mut missing = None;
         for_each_shape(scene, range, |(id, shape), _| match shape.map(Shape::sound) {
             Some(Some(shape)) => {
-                self.bounds.add(&shape.aabb());
+                let aabb = shape.aabb();
+                self.bounds.add(&aabb);
+                for (lower, upper) in aabb.lower.into_iter().zip(aabb.upper) {
+                    self.longest = self.longest.max(upper - lower);
+                }
                 match shape {
                     Shape::Triangle(_) => self.triangle_count += 1,
                     Shape::Sphere { .. } | Shape::Box(_) => self.sphere_count += 1,
@@ -337,6 +342,7 @@ impl Census {
 
     fn add(&mut self, other: &Census) {
         self.bounds.add(&other.bounds);
+        self.longest = self.longest.max(other.longest);
         self.triangle_count += other.triangle_count;
         self.sphere_count += other.sphere_count;
         self.ignored_count += other.ignored_count;

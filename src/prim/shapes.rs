@@ -32,8 +32,16 @@ pub(crate) struct Shapes<'s, 'a> {
 }
 
 impl<'s, 'a> Shapes<'s, 'a> {
-    pub fn new(scene: &'s Scene<'a, 'a>, geometries: &'s [Geometry]) -> Self {
-        Source { scene, geometries, named: false }.shapes()
+    /// Has shapes fetched that come soon: first the indices, then what they name. `next` gives the number of the shape
+    /// that comes so many later.
+    #[inline]
+    pub fn look_ahead(&self, next: impl Fn(usize) -> Option<u32>) {
+        if let Some(id) = next(2 * AHEAD) {
+            self.prefetch(id);
+        }
+        if let Some(id) = next(AHEAD) {
+            self.prefetch_vertices(id);
+        }
     }
 
     /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.

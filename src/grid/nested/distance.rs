@@ -1,25 +1,57 @@
 //! How far empty space goes on, in each octant of directions.
 
-use super::lists::Room;
 use crate::block::cells::{SIDES, cell_count, resolution};
+use crate::caller::{Caller, PARTS};
+use core::mem::take;
 
 /// No cube is larger than that.
 const FAR: u32 = SIDES[7] as u32;
 
-/// Writes into the word of each empty cell how large a cube of empty cells it is the corner of, for each octant.
-pub(super) fn fill(room: &mut Room) -> Option<()> {
-    let words = room.words.all();
-    let mut first = 0;
-    while let Some(word) = words.get(first) {
-        let n = resolution(*word);
-        let end = first + 1 + cell_count(n) as usize;
-        let cells = words.get_mut(first + 1..end)?;
-        room.pairs.shrink_to(0);
-        room.pairs.grow(cells.len())?;
-        for octant in 0..8 {
-            fill_octant(cells, n.map(|n| n as usize), octant, room.pairs.all());
+/// So many words are worth a thread.
+const PART: usize = 1 << 14;
+
+/// Writes into the word of each empty cell how large a cube of empty cells it is the corner of, for each octant. `sides` is for
+/// scratch: a number for each cell of the largest grid, or for each word where there are threads.
+pub(super) fn fill(words: &mut [u32], sides: &mut [u32], caller: &Caller) -> Option<()> {
+    if caller.part_count() == 1 || words.len() < PART || sides.len() < words.len() {
+        return fill_grids(words, sides);
+    }
+    let (mut jobs, size) = ([const { None }; PARTS], caller.part_size(words.len(), PART));
+    let (mut words, mut sides) = (words, sides);
+    for job in &mut jobs {
+        let end = grids_in(words, size)?;
+        let (grids, more) = take(&mut words).split_at_mut(end);
+        let (own, rest) = take(&mut sides).split_at_mut(grids.len());
+        (words, sides) = (more, rest);
+        *job = Some((grids, own, None));
+    }
+    caller.for_each(&mut jobs, |job| {
+        if let Some((words, sides, done)) = job {
+            *done = fill_grids(words, sides);
         }
-        first = end;
+    });
+    jobs.iter().flatten().try_for_each(|(_, _, done)| *done)
+}
+
+/// The words of the first grids, at least `size` if there are so many.
+fn grids_in(words: &[u32], size: usize) -> Option<usize> {
+    let mut end = 0;
+    while end < size.min(words.len()) {
+        end += 1 + cell_count(resolution(*words.get(end)?)) as usize;
+    }
+    Some(end)
+}
+
+/// The same for the grids in some words, one after the other.
+fn fill_grids(mut words: &mut [u32], sides: &mut [u32]) -> Option<()> {
+    while let Some((word, rest)) = words.split_first_mut() {
+        let n = resolution(*word);
+        let (cells, more) = rest.split_at_mut_checked(cell_count(n) as usize)?;
+        let sides = sides.get_mut(..cells.len())?;
+        for octant in 0..8 {
+            fill_octant(cells, n.map(|n| n as usize), octant, sides);
+        }
+        words = more;
     }
     Some(())
 }

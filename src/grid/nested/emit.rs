@@ -1,180 +1,211 @@
 //! From lists of numbers to leaf blocks and runs: the finished block.
 
+use super::Attempt;
 use super::grow::Grown;
-use super::lists::{BOX_WORDS, END, Room, numbers};
-use crate::block::cells::{Cell, CellBox, LAST, Run, box_word, cell, run_word};
-use crate::block::leaf::{KIND_TRIANGLES, SPHERES, TRIANGLES, TriangleBlock, block_ref};
-use crate::block::{Census, Counts, KIND_GRID, LAYOUT_COMPACT, PartsMut};
-use crate::prim::{Packer, Shapes, Survey, geometries};
+use super::lists::keep;
+use super::pack::{CHUNK, Lists, Part, Tally, Used, settle};
+use crate::block::cells::Run;
+use crate::block::leaf::TriangleBlock;
+use crate::block::{Census, Counts, Geometry, KIND_GRID, LAYOUT_COMPACT, PartsMut};
+use crate::caller::{Caller, PARTS};
+use crate::prim::{Source, Survey, geometries};
 use crate::scene::Scene;
-use crate::storage::{ALIGNMENT, view_mut};
+use crate::storage::{ALIGNMENT, view, view_mut};
+use core::mem::take;
 
 /// Packs what the cells list, each cell's after the one before it, so that a cell's are in few blocks; returns the size of the
-/// block, or `None` when it does not fit.
+/// block, or `None` when it does not fit, or when the caller wants no more.
 ///
-/// A primitive is stored again for each cell that lists it, unless the block being filled holds it already.
+/// ```text
+/// | header | .. | triangle blocks of each part, with room for more | runs of each part, likewise | kept words | lists |
+/// ```
 pub(super) fn emit(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
     grown: &Grown,
+    attempt: &Attempt,
     bytes: &mut [u8],
 ) -> Option<usize> {
-    let kept_at = Room::keep(grown.most, grown.words, grown.listed, bytes)?;
+    let caller = attempt.caller;
+    let kept_at = keep(grown.most, grown.words, grown.listed, bytes)?;
     let (front, kept) = bytes.split_at_mut(kept_at);
-    let kept = view_mut::<u32>(kept, 0, grown.words + grown.listed)?;
-    let (words, listed) = kept.split_at_mut(grown.words);
-    let runs_at = front.len().checked_sub(size_of::<Run>() * most_runs(listed))?;
+    let (words, listed) = view::<u32>(kept, 0, grown.words + grown.listed)?.split_at(grown.words);
+    let lists = Lists { listed, triangle_limit: census.triangle_limit };
+    let tallies = Tallies::new(words, lists, caller);
+    let runs_at = front.len().checked_sub(size_of::<Run>() * tallies.all.runs)?;
     let runs_at = runs_at / ALIGNMENT * ALIGNMENT;
     let (front, runs) = front.split_at_mut(runs_at);
-    let len = runs.len() / size_of::<Run>();
-    let runs = view_mut::<Run>(runs, 0, len)?;
-    let mut counts = most_counts(survey, census, grown, listed, front.len())?;
-    let parts = counts.parts_mut(front)?;
-    (counts.triangle_blocks, counts.runs) = fill(scene, census, grown, parts, words, listed, runs)?;
-    let at = counts.offsets()?;
-    let runs_end = runs_at + size_of::<Run>() * counts.runs as usize;
-    bytes.copy_within(runs_at..runs_end, at.runs);
+    let runs = view_mut::<Run>(runs, 0, tallies.all.runs)?;
+    let room = most_counts(survey, grown, &tallies.all, front.len())?;
+    let mut parts = room.parts_mut(front)?;
+    for (place, head) in parts.grids.iter_mut().zip(grown.heads.iter().flatten()) {
+        *place = *head;
+    }
+    geometries(scene, parts.geometries);
+    let mut packing = Packing { scene, lists, caller, words, runs };
+    let packed = packing.pack(&tallies, &mut parts);
+    // What is too much for the memory of a part need not be too much.
+    let packed = packed.or_else(|| packing.pack(&tallies.together()?, &mut parts))?;
+    attempt.done(1.0)?;
+    let used = join_blocks(&packed, parts.triangle_blocks);
+    let (triangle_blocks, runs) = (used.triangle_blocks as u32, used.runs as u32);
+    let counts = Counts { triangle_blocks, runs, ..room };
+    join_runs(&packed, runs_at, &counts, caller, bytes)?;
     counts.seal(KIND_GRID, LAYOUT_COMPACT, census, bytes)
 }
 
-/// As many runs as the lists can need: one for each block, of which the second and later ones hold five numbers or are the last.
-fn most_runs(listed: &[u32]) -> usize {
-    let (mut runs, mut in_list) = (0, 0);
-    for id in listed {
-        in_list += 1;
-        if id & END != 0 {
-            // A box, and runs of triangles and of spheres.
-            runs += in_list.min(4 + in_list / 5);
-            in_list = 0;
+/// How much the words of each part list, and all.
+struct Tallies {
+    /// Words of a part.
+    size: usize,
+    parts: [Option<Tally>; PARTS],
+    all: Tally,
+}
+
+impl Tallies {
+    fn new(words: &[u32], lists: Lists, caller: &Caller) -> Self {
+        let size = caller.part_size(words.len(), CHUNK);
+        let (mut parts, mut all) = ([None; PARTS], Tally::default());
+        let made = caller.map_parts(words.len(), size, |part| lists.tally(&words[part]));
+        for (part, tally) in parts.iter_mut().zip(made) {
+            all.add(&tally);
+            *part = Some(tally);
         }
+        Tallies { size, parts, all }
     }
-    runs
+
+    /// The same as one part, if there were several.
+    fn together(&self) -> Option<Tallies> {
+        let mut parts = [None; PARTS];
+        parts[0] = Some(self.all);
+        self.parts[1].map(|_| Tallies { size: usize::MAX, parts, all: self.all })
+    }
 }
 
 /// The sizes of the parts, with all triangle blocks for which there is room.
-fn most_counts(
-    survey: &Survey,
-    census: &Census,
-    grown: &Grown,
-    listed: &[u32],
-    size: usize,
-) -> Option<Counts> {
-    let spheres = numbers(listed).filter(|id| id & !END >= census.triangle_limit).count();
+fn most_counts(survey: &Survey, grown: &Grown, all: &Tally, size: usize) -> Option<Counts> {
     let counts = Counts {
         geometries: survey.geometry_count,
-        prim_ids: numbers(listed).count() as u32,
+        prim_ids: (all.triangles + all.spheres) as u32,
         grids: grown.heads.iter().flatten().count() as u32,
         words: grown.words as u32,
-        sphere_blocks: spheres.div_ceil(SPHERES) as u32,
+        sphere_blocks: all.sphere_blocks as u32,
         ..Counts::default()
     };
     let room = size.checked_sub(counts.offsets()?.end)? / size_of::<TriangleBlock>();
-    Some(Counts { triangle_blocks: room.min(listed.len()) as u32, ..counts })
+    Some(Counts { triangle_blocks: room.min(all.triangles) as u32, ..counts })
 }
 
-/// Writes everything but the header; returns the numbers of triangle blocks and runs.
-fn fill(
-    scene: &Scene,
-    census: &Census,
-    grown: &Grown,
-    parts: PartsMut,
-    words: &[u32],
-    listed: &[u32],
-    runs: &mut [Run],
-) -> Option<(u32, u32)> {
-    let PartsMut { geometries: table, prim_ids, grids, triangle_blocks, sphere_blocks, .. } = parts;
-    for (place, head) in grids.iter_mut().zip(grown.heads.iter().flatten()) {
-        *place = *head;
-    }
-    geometries(scene, table);
-    let is_triangle = |id: &u32| id & !END < census.triangle_limit;
-    let first_sphere = numbers(listed).filter(is_triangle).count() as u32;
-    let mut emitter = Emitter {
-        shapes: Shapes::new(scene, table),
-        packer: Packer::new(triangle_blocks, sphere_blocks, 0, first_sphere),
-        prim_ids,
-        next_id: [0, first_sphere as usize],
-        open: (u32::MAX, [u32::MAX; TRIANGLES]),
-        runs,
-        run_count: 0,
-    };
-    for (out, word) in parts.words.iter_mut().zip(words) {
-        *out = match cell(*word) {
-            Cell::Run(first) => run_word(emitter.list(listed.get(first + BOX_WORDS..)?)?),
-            Cell::Boxed(first) => {
-                let (cell_box, list) = listed.get(first..)?.split_first_chunk()?;
-                let first = emitter.cell_box(CellBox::from_words(*cell_box))?;
-                emitter.list(list)?;
-                box_word(first)
-            }
-            Cell::Empty | Cell::Grid(_) => *word,
-        };
-    }
-    Some((emitter.packer.triangle_block_count() as u32, emitter.run_count as u32))
+/// What a part was packed to, and where in the memory of all.
+#[derive(Clone, Copy)]
+struct Packed {
+    words: usize,
+    triangle_blocks_at: usize,
+    runs_at: usize,
+    used: Used,
 }
 
-/// What packing writes to.
-struct Emitter<'s, 'a, 'b> {
-    shapes: Shapes<'s, 'a>,
-    packer: Packer<'b>,
-    prim_ids: &'b mut [u32],
-    /// Where the numbers of the next triangle and sphere go.
-    next_id: [usize; 2],
-    /// The triangle block being filled, and whose are its lanes.
-    open: (u32, [u32; TRIANGLES]),
-    runs: &'b mut [Run],
-    run_count: usize,
+/// Fills all but the header, part after part or at the same time.
+struct Packing<'s> {
+    scene: &'s Scene<'s, 's>,
+    lists: Lists<'s>,
+    caller: &'s Caller<'s>,
+    /// What is to be packed, and where runs go.
+    words: &'s [u32],
+    runs: &'s mut [Run],
 }
 
-impl Emitter<'_, '_, '_> {
-    /// Writes the box of a cell before its run, and returns its entry.
-    fn cell_box(&mut self, cell_box: CellBox) -> Option<u32> {
-        *self.runs.get_mut(self.run_count)? = Run::of_box(cell_box);
-        self.run_count += 1;
-        Some(self.run_count as u32 - 1)
+impl Packing<'_> {
+    fn pack(&mut self, tallies: &Tallies, parts: &mut PartsMut) -> Option<[Option<Packed>; PARTS]> {
+        let all = tallies.all;
+        let geometries: &[Geometry] = parts.geometries;
+        parts.words.copy_from_slice(self.words);
+        let mut words = &mut *parts.words;
+        let (mut triangles, mut spheres) = parts.prim_ids.split_at_mut(all.triangles);
+        let (mut sphere_blocks, mut blocks) =
+            (&mut *parts.sphere_blocks, &mut *parts.triangle_blocks);
+        let mut runs = &mut *self.runs;
+        let (mut done, blocks_len, runs_len) = (Tally::default(), blocks.len(), runs.len());
+        let mut jobs = [const { None }; PARTS];
+        for (job, tally) in jobs.iter_mut().zip(tallies.parts.iter().flatten()) {
+            // Of the triangle blocks, of which nobody knows how many it will be, as many as of the triangles that are left.
+            let left = (all.triangles - done.triangles).max(1) as u64;
+            let share = blocks.len() as u64 * tally.triangles as u64 / left;
+            let at = (blocks_len - blocks.len(), runs_len - runs.len());
+            let size = tallies.size.min(words.len());
+            let part = Part {
+                words: front(&mut words, size)?,
+                ids: [front(&mut triangles, tally.triangles)?, front(&mut spheres, tally.spheres)?],
+                first_ids: [done.triangles, all.triangles + done.spheres],
+                sphere_blocks: front(&mut sphere_blocks, tally.sphere_blocks)?,
+                triangle_blocks: front(&mut blocks, share as usize)?,
+                runs: front(&mut runs, tally.runs)?,
+                used: Used::default(),
+            };
+            *job = Some((part, at, None));
+            done.add(tally);
+        }
+        let (lists, scene) = (self.lists, self.scene);
+        self.caller.for_each(&mut jobs, |job| {
+            if let Some((part, _, done)) = job {
+                *done = part.pack(lists, Source { scene, geometries, named: false });
+            }
+        });
+        jobs.iter().flatten().try_for_each(|(_, _, done)| *done)?;
+        Some(jobs.map(|job| {
+            let (part, (triangle_blocks_at, runs_at), _) = job?;
+            Some(Packed { words: part.words.len(), triangle_blocks_at, runs_at, used: part.used })
+        }))
     }
+}
 
-    /// Packs a list that begins here, and returns its first entry.
-    fn list(&mut self, listed: &[u32]) -> Option<u32> {
-        let first = self.run_count;
-        for id in listed {
-            let (block, lane) = self.pack(id & !END)?;
-            let is_same =
-                self.run_count > first && self.runs.get(self.run_count - 1)?.block == block;
-            if !is_same {
-                *self.runs.get_mut(self.run_count)? = Run { block, lanes: 0 };
-                self.run_count += 1;
-            }
-            let run = self.runs.get_mut(self.run_count - 1)?;
-            run.lanes |= 1 << lane;
-            if id & END != 0 {
-                run.lanes |= LAST;
-                break;
-            }
-        }
-        Some(first as u32)
-    }
+/// Takes the first elements off a slice.
+fn front<'b, T>(slice: &mut &'b mut [T], count: usize) -> Option<&'b mut [T]> {
+    let (front, rest) = take(slice).split_at_mut_checked(count)?;
+    *slice = rest;
+    Some(front)
+}
 
-    /// The block and the lane of a primitive: where it is in the open block, or a new place.
-    fn pack(&mut self, id: u32) -> Option<(u32, u32)> {
-        let (open, ids) = &mut self.open;
-        if let Some(lane) = ids.iter().position(|other| *other == id) {
-            return Some((*open, lane as u32));
+/// Moves the triangle blocks of the parts together; returns how much all have.
+fn join_blocks(packed: &[Option<Packed>; PARTS], blocks: &mut [TriangleBlock]) -> Used {
+    let mut all = Used::default();
+    for Packed { used, triangle_blocks_at: at, .. } in packed.iter().flatten() {
+        if *at > all.triangle_blocks {
+            blocks.copy_within(*at..at + used.triangle_blocks, all.triangle_blocks);
         }
-        let shape = self.shapes.get(id)?;
-        let (block, lane) = self.packer.push(&shape)?;
-        let is_triangle =
-            block >= block_ref(KIND_TRIANGLES, 0) && block < block_ref(KIND_TRIANGLES + 1, 0);
-        if is_triangle {
-            if block != *open {
-                (*open, *ids) = (block, [u32::MAX; TRIANGLES]);
-            }
-            *ids.get_mut(lane as usize)? = id;
-        }
-        let next = &mut self.next_id[usize::from(!is_triangle)];
-        *self.prim_ids.get_mut(*next)? = id;
-        *next += 1;
-        Some((block, lane))
+        all.add(used);
     }
+    all
+}
+
+/// Moves the runs of the parts behind the triangle blocks, and lets them and the words name what is where it now is.
+fn join_runs(
+    packed: &[Option<Packed>; PARTS],
+    from: usize,
+    counts: &Counts,
+    caller: &Caller,
+    bytes: &mut [u8],
+) -> Option<()> {
+    const RUN: usize = size_of::<Run>();
+    let mut to = counts.offsets()?.runs;
+    for Packed { used, runs_at, .. } in packed.iter().flatten() {
+        let start = from + RUN * runs_at;
+        bytes.copy_within(start..start + RUN * used.runs, to);
+        to += RUN * used.runs;
+    }
+    let PartsMut { mut words, mut runs, .. } = counts.parts_mut(bytes)?;
+    let (mut jobs, mut before) = ([const { None }; PARTS], Used::default());
+    for (job, part) in jobs.iter_mut().zip(packed.iter().flatten()) {
+        let (words, runs) = (front(&mut words, part.words)?, front(&mut runs, part.used.runs)?);
+        *job = Some((words, runs, before, None));
+        before.add(&part.used);
+    }
+    // The first part's names are right.
+    caller.for_each(&mut jobs[1..], |job| {
+        if let Some((words, runs, before, done)) = job {
+            *done = settle(words, runs, before);
+        }
+    });
+    jobs[1..].iter().flatten().try_for_each(|(_, _, _, done)| *done)
 }

@@ -5,10 +5,16 @@
 
 mod cost;
 mod distance;
+mod divide;
 mod emit;
+mod fill;
 mod grow;
+mod growing;
 mod large;
+mod levels;
 mod lists;
+mod outermost;
+mod pack;
 
 use super::options::GridOptions;
 use super::space::Space;
@@ -17,9 +23,17 @@ use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, SPHERES, TRIANGLES_AT_LEAST, TriangleBlock, block_ref,
 };
 use crate::block::{Census, Counts, KIND_GRID, LAYOUT_COMPACT, PartsMut};
+use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::prim::{Survey, pack_in_order};
 use crate::scene::Scene;
+
+/// A grid whose boxes reach more cells than this for each number that may be listed is too fine: it would take too
+/// long to find out which of these are near.
+const WORK: u64 = 32;
+
+/// How often a grid that is too fine is halved along each axis before it is given up.
+const TRIES: u32 = 10;
 
 /// Bytes for each primitive that a build may use beyond what one cell takes.
 const SPARE: usize = 64;
@@ -60,17 +74,44 @@ pub(super) fn build(
     survey: &Survey,
     census: &Census,
     options: &GridOptions,
+    caller: &Caller,
     bytes: &mut [u8],
 ) -> Result<usize, BuildError> {
-    let mut most = lists::Room::most_refs(survey, bytes.len()).min(most_packed(scene, bytes.len()));
-    while most > u64::from(census.hittable()) {
-        let Some(grown) = grow::grow(scene, survey, census, options, most, bytes) else { break };
-        if let Some(size) = emit::emit(scene, survey, census, &grown, bytes) {
+    let mut most = lists::most_refs(survey, bytes.len()).min(most_packed(scene, bytes.len()));
+    let mut begun = 0.1;
+    while most > u64::from(census.hittable()) && !caller.cancelled() {
+        let attempt = Attempt { most, caller, begun };
+        let grown = grow::grow(scene, survey, census, options, &attempt, bytes);
+        let Some(grown) = grown else { break };
+        if let Some(size) = emit::emit(scene, survey, census, &grown, &attempt, bytes) {
             return Ok(size);
         }
-        most = most / 4 * 3;
+        (most, begun) = (most / 4 * 3, attempt.part(1.0));
+    }
+    if caller.cancelled() {
+        return Err(BuildError::Cancelled);
     }
     build_one_cell(scene, survey, census, bytes)
+}
+
+/// A build in which cells may list so many numbers.
+struct Attempt<'a> {
+    most: u64,
+    caller: &'a Caller<'a>,
+    /// How far the whole was when it began.
+    begun: f32,
+}
+
+impl Attempt<'_> {
+    /// Says how far it is, from 0 to 1; `None` when the caller wants no more.
+    fn done(&self, part: f32) -> Option<()> {
+        self.caller.done(self.part(part))
+    }
+
+    /// The same of the whole, which it does not finish, as it may not fit.
+    fn part(&self, part: f32) -> f32 {
+        self.begun + 0.8 * part * (1.0 - self.begun)
+    }
 }
 
 /// How many numbers can be listed so that the blocks fit, roughly: what does not is tried again.

@@ -1,13 +1,15 @@
 //! How fine the grid is, and how much memory that takes.
 
+use super::pack::most_blocks;
 use crate::block::cells::{MOST_CELLS, VALUE, cell_count};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{Census, Counts};
+use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::grid::options::GridOptions;
 use crate::grid::space::{Space, cubes, proportions};
 use crate::math::float::cube_root;
-use crate::prim::{Survey, for_each_counted};
+use crate::prim::{GRAIN, Survey, for_each_prim_in};
 use crate::scene::Scene;
 
 /// References from cells to primitives, for each primitive, above which a grid is made coarser. A
@@ -17,6 +19,7 @@ const REFERENCES_PER_PRIM: u64 = 32;
 const REFERENCES_AT_LEAST: u64 = 4096;
 
 /// A grid that was not built yet.
+#[derive(Clone, Copy)]
 pub(crate) struct Plan {
     pub space: Space,
     /// Sizes of the parts, with room for the most triangle blocks and runs there can be.
@@ -43,18 +46,25 @@ fn rounded(cells: [f64; 3]) -> [u32; 3] {
 
 impl Plan {
     /// The plan with this resolution, or `None` when it refers to primitives too often.
-    fn with(scene: &Scene, survey: &Survey, census: &Census, resolution: [u32; 3]) -> Option<Plan> {
+    fn with(
+        scene: &Scene,
+        survey: &Survey,
+        census: &Census,
+        caller: &Caller,
+        resolution: [u32; 3],
+    ) -> Option<Plan> {
         let space = Space::over(&census.bounds, resolution);
         let cells = cell_count(space.resolution);
         let prims = u64::from(census.hittable());
         let most = (REFERENCES_PER_PRIM * prims).max(REFERENCES_AT_LEAST).min(u64::from(VALUE));
         // In a single cell everything is once.
-        let references = if cells == 1 { prims } else { references(scene, census, &space) };
+        let references = if cells == 1 { prims } else { references(scene, census, &space, caller) };
         if references > most && cells > 1 {
             return None;
         }
-        let sphere_blocks = census.sphere_count.div_ceil(SPHERES as u32);
-        let triangle_blocks = census.triangle_count.div_ceil(TRIANGLES_AT_LEAST as u32);
+        let sphere_blocks = most_blocks(census.sphere_count as usize, SPHERES) as u32;
+        let triangles = census.triangle_count as usize;
+        let triangle_blocks = most_blocks(triangles, TRIANGLES_AT_LEAST) as u32;
         // No block is twice in a run.
         let blocks = u64::from(sphere_blocks) + u64::from(triangle_blocks);
         let runs = references.min(blocks * cells);
@@ -78,13 +88,14 @@ impl Plan {
         survey: &Survey,
         census: &Census,
         options: &GridOptions,
+        caller: &Caller,
         limit: usize,
     ) -> Result<Plan, BuildError> {
         let mut cells = wanted(census, options);
         loop {
             let resolution = rounded(cells);
             let is_one = resolution == [1; 3];
-            match Plan::with(scene, survey, census, resolution) {
+            match Plan::with(scene, survey, census, caller, resolution) {
                 Some(plan) if plan.size <= limit => return Ok(plan),
                 Some(plan) if is_one => {
                     return Err(BuildError::OutOfMemory { minimum: plan.size });
@@ -96,17 +107,26 @@ impl Plan {
     }
 
     /// The plan that takes the least memory: one cell.
-    pub fn coarsest(scene: &Scene, survey: &Survey, census: &Census) -> Result<Plan, BuildError> {
-        Plan::with(scene, survey, census, [1; 3]).ok_or(BuildError::TooLarge)
+    pub fn coarsest(
+        scene: &Scene,
+        survey: &Survey,
+        census: &Census,
+        caller: &Caller,
+    ) -> Result<Plan, BuildError> {
+        Plan::with(scene, survey, census, caller, [1; 3]).ok_or(BuildError::TooLarge)
     }
 }
 
 /// How often cells refer to primitives: a bound on the entries of all runs.
-fn references(scene: &Scene, census: &Census, space: &Space) -> u64 {
-    let mut sum = 0u64;
-    for_each_counted(scene, census, |prim| {
-        let cells = space.range_of(&prim.shape.aabb()).cell_count();
-        sum = sum.saturating_add(cells);
+fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) -> u64 {
+    let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
+    let sums = caller.map_parts(limit, caller.part_size(limit, GRAIN), |ids| {
+        let mut sum = 0u64;
+        for_each_prim_in(scene, ids.start as u32..ids.end as u32, sound, |prim| {
+            let cells = space.range_of(&prim.shape.aabb()).cell_count();
+            sum = sum.saturating_add(cells);
+        });
+        sum
     });
-    sum
+    sums.fold(0, u64::saturating_add)
 }

@@ -1,0 +1,156 @@
+//! Divides full cells, one after the other.
+
+use super::cost::{self, FULL};
+use super::fill::{Cells, box_in, list_cell, make_room};
+use super::growing::Growing;
+use super::lists::{Record, Waiting};
+use super::{TRIES, WORK};
+use crate::block::cells::{box_word, cell_count, grid_word, resolution_word};
+use crate::grid::options::GridOptions;
+use crate::grid::overlap::cells_near;
+use crate::grid::space::Space;
+use crate::prim::Source;
+
+/// Divides cells of one depth.
+pub(super) struct Divider<'s, 'a, 'p> {
+    pub source: Source<'s, 'a>,
+    /// The outermost grid.
+    pub space: Space,
+    pub options: &'p GridOptions,
+    /// Whether these are a part of those there are, and there may be more room than it has.
+    pub is_part: bool,
+    /// Whether cells in these are as deep as they may be.
+    pub is_last: bool,
+    /// The lists of the cells.
+    pub list: &'p [u32],
+    pub growing: Growing<'p>,
+    /// How many numbers cells may list, and how many they do, waiting ones too.
+    pub most: u64,
+    pub total: u64,
+    /// Into how many parts at most an outermost cell is divided along an axis.
+    pub finest: f64,
+}
+
+/// What counting the primitives in the cells of a grid leads to.
+#[derive(Clone, Copy, PartialEq)]
+enum Counted {
+    WorthIt,
+    NotWorthIt,
+    /// Its cells are so small that primitives are in too many.
+    TooFine,
+    NoRoom,
+}
+
+/// By how many numbers the lists of a cell's cells are likely to be longer than its own, at the least: with room for
+/// fewer it is not tried.
+pub(super) fn least_growth(count: u32) -> u64 {
+    u64::from(count / 16)
+}
+
+impl Divider<'_, '_, '_> {
+    /// Divides cells that wait, or lists what is in those that had better stay whole; writes down what they become.
+    pub fn divide_each(&mut self, waiting: &mut [Record]) -> Option<()> {
+        for record in waiting {
+            let mut cell = Waiting::unpacked(*record);
+            cell.becomes = match self.divide(&cell)? {
+                Some(word) => word,
+                None => self.leave_whole(&cell)?,
+            };
+            *record = cell.packed();
+        }
+        Some(())
+    }
+
+    /// Lists what is in a cell.
+    fn leave_whole(&mut self, cell: &Waiting) -> Option<u32> {
+        let space = self.space.within(cell.place, [1; 3]);
+        let ids = &self.list[cell.first as usize..][..cell.count as usize];
+        let cell_box = box_in(&space, [0; 3], &mut self.source.shapes(), ids);
+        Some(box_word(list_cell(&mut self.growing.listed, cell_box, ids)?))
+    }
+
+    /// Divides a cell, more coarsely if it must be; returns its word, if it is not to stay whole.
+    fn divide(&mut self, cell: &Waiting) -> Option<Option<u32>> {
+        if self.total + least_growth(cell.count) > self.most {
+            return Some(None);
+        }
+        for coarser in 0..TRIES {
+            let resolution =
+                cost::inner(&self.space, &cell.place, self.options, cell.count, coarser);
+            let Some(resolution) = resolution else { break };
+            let space = self.space.within(cell.place, resolution);
+            let first = self.growing.words.end();
+            let counted = self.count_all(cell, &space);
+            if counted == Counted::WorthIt {
+                self.total += self.growing.pairs.len() as u64;
+                self.total -= u64::from(cell.count);
+                self.finest = space.parts().into_iter().fold(self.finest, f64::max);
+                self.fill(&space, first + 1)?;
+                return Some(Some(grid_word(first as u32)));
+            }
+            self.growing.words.shrink_to(first);
+            match counted {
+                Counted::NoRoom if self.is_part => return None,
+                Counted::NoRoom | Counted::TooFine => {}
+                Counted::WorthIt | Counted::NotWorthIt => break,
+            }
+        }
+        Some(None)
+    }
+
+    /// Begins the grid in a cell by counting what is in its cells.
+    fn count_all(&mut self, cell: &Waiting, space: &Space) -> Counted {
+        let cells = cell_count(space.resolution) as usize;
+        let Some(first) = self.growing.words.grow(1 + cells) else { return Counted::NoRoom };
+        self.growing.words.from(first)[0] = resolution_word(space.resolution);
+        let counted = self.count_refs(cell, space, first + 1);
+        let counts = &self.growing.words.from(first)[1..];
+        if counted == Counted::WorthIt && !cost::is_worth_it(cell.count, counts) {
+            return Counted::NotWorthIt;
+        }
+        counted
+    }
+
+    /// Writes down which primitives come near which cells, and counts them.
+    fn count_refs(&mut self, cell: &Waiting, space: &Space, first: usize) -> Counted {
+        let left = (self.most + u64::from(cell.count)).saturating_sub(self.total);
+        let ids = &self.list[cell.first as usize..][..cell.count as usize];
+        let Growing { words, pairs, .. } = &mut self.growing;
+        let counts = words.from(first);
+        counts.fill(0);
+        pairs.clear();
+        let (mut work, mut full) = (0, false);
+        let mut shapes = self.source.shapes();
+        for id in ids {
+            let Some(shape) = shapes.get(*id) else { continue };
+            work += cells_near(space, &shape, |number| {
+                counts[number] += 1;
+                full |= pairs.push([number as u32, *id]).is_none();
+            });
+            if full || pairs.len() as u64 > left {
+                return Counted::NoRoom;
+            }
+            if work > WORK * u64::from(cell.count) {
+                return Counted::TooFine;
+            }
+        }
+        Counted::WorthIt
+    }
+
+    /// Gives each cell of a grid its list.
+    fn fill(&mut self, space: &Space, first: usize) -> Option<()> {
+        let full = if self.is_last { u32::MAX } else { FULL };
+        let [_, listed_from, next_from, _] = self.growing.ends();
+        let all = 0..cell_count(space.resolution) as usize;
+        make_room(&mut self.growing, space, first, all, full)?;
+        let Growing { words, listed, next, pairs, .. } = &mut self.growing;
+        let mut cells = Cells {
+            first: 0,
+            words: words.from(first),
+            listed: (listed.from(listed_from), listed_from),
+            next: (next.from(next_from), next_from),
+        };
+        cells.list(pairs.all());
+        cells.finish(space, &mut self.source.shapes())
+    }
+}

@@ -1,0 +1,244 @@
+//! Packs the lists of some words into leaf blocks and runs.
+
+use super::lists::{BOX_WORDS, END};
+use crate::block::cells::{Cell, CellBox, LAST, Run, box_word, cell, run_word};
+use crate::block::leaf::{KIND_SPHERES, SPHERES, SphereBlock, TRIANGLES, TriangleBlock, block_ref};
+use crate::prim::{Packer, Shapes, Source};
+
+/// So many words begin with blocks of their own: whatever is in other words, theirs are packed alike, and on any thread. On average that leaves
+/// half a block free.
+pub(super) const CHUNK: usize = 1 << 11;
+
+/// How much some words list.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Tally {
+    /// Numbers of triangles and of spheres.
+    pub triangles: usize,
+    pub spheres: usize,
+    pub sphere_blocks: usize,
+    /// As many as there can be.
+    pub runs: usize,
+}
+
+/// What cells list, and whose the numbers are.
+#[derive(Clone, Copy)]
+pub(super) struct Lists<'s> {
+    pub listed: &'s [u32],
+    /// Numbers below are triangles.
+    pub triangle_limit: u32,
+}
+
+impl Lists<'_> {
+    /// The list of a cell and its box, if it has them.
+    fn of(&self, word: u32) -> Option<(&[u32], Option<CellBox>)> {
+        let (first, boxed) = match cell(word) {
+            Cell::Run(first) => (first, false),
+            Cell::Boxed(first) => (first, true),
+            Cell::Empty | Cell::Grid(_) => return None,
+        };
+        let (cell_box, list) = self.listed.get(first..)?.split_first_chunk::<BOX_WORDS>()?;
+        let len = 1 + list.iter().position(|id| id & END != 0)?;
+        Some((&list[..len], boxed.then(|| CellBox::from_words(*cell_box))))
+    }
+
+    /// How much words that begin with a chunk list.
+    pub fn tally(&self, words: &[u32]) -> Tally {
+        let mut tally = Tally::default();
+        for words in words.chunks(CHUNK) {
+            let mut spheres = 0;
+            for (list, _) in words.iter().filter_map(|word| self.of(*word)) {
+                let is_sphere = |id: &&u32| **id & !END >= self.triangle_limit;
+                let round = list.iter().filter(is_sphere).count();
+                tally.triangles += list.len() - round;
+                spheres += round;
+                // A box, and one for each block, of which the second and later ones hold five or are the last; of triangles and of spheres.
+                tally.runs += list.len().min(4 + list.len() / 5);
+            }
+            tally.spheres += spheres;
+            tally.sphere_blocks += spheres.div_ceil(SPHERES);
+        }
+        tally
+    }
+}
+
+impl Tally {
+    pub fn add(&mut self, other: &Tally) {
+        self.triangles += other.triangles;
+        self.spheres += other.spheres;
+        self.sphere_blocks += other.sphere_blocks;
+        self.runs += other.runs;
+    }
+}
+
+/// Words to be packed, and the memory for it.
+pub(super) struct Part<'b> {
+    pub words: &'b mut [u32],
+    /// The numbers of triangles and of spheres, and where among all numbers they begin.
+    pub ids: [&'b mut [u32]; 2],
+    pub first_ids: [usize; 2],
+    pub sphere_blocks: &'b mut [SphereBlock],
+    pub triangle_blocks: &'b mut [TriangleBlock],
+    pub runs: &'b mut [Run],
+    /// How much of these is in use; what names them counts from their begin.
+    pub used: Used,
+}
+
+#[derive(Clone, Copy, Default)]
+pub(super) struct Used {
+    pub ids: [usize; 2],
+    pub sphere_blocks: usize,
+    pub triangle_blocks: usize,
+    pub runs: usize,
+}
+
+impl Used {
+    pub fn add(&mut self, other: &Used) {
+        (0..2).for_each(|kind| self.ids[kind] += other.ids[kind]);
+        self.sphere_blocks += other.sphere_blocks;
+        self.triangle_blocks += other.triangle_blocks;
+        self.runs += other.runs;
+    }
+}
+
+impl Part<'_> {
+    /// Packs what the words list, which come to name runs. `None` when it does not fit.
+    pub fn pack(&mut self, lists: Lists, source: Source) -> Option<()> {
+        let chunks = self.words.len().div_ceil(CHUNK);
+        (0..chunks).try_for_each(|chunk| self.pack_chunk(chunk, lists, source))
+    }
+
+    fn pack_chunk(&mut self, chunk: usize, lists: Lists, source: Source) -> Option<()> {
+        let Used { ids: [triangle, sphere], sphere_blocks, triangle_blocks, runs } = self.used;
+        let [triangle_ids, sphere_ids] = &mut self.ids;
+        let mut emitter = Emitter {
+            shapes: source.shapes(),
+            packer: Packer::new(
+                self.triangle_blocks.get_mut(triangle_blocks..)?,
+                self.sphere_blocks.get_mut(sphere_blocks..)?,
+                (self.first_ids[0] + triangle) as u32,
+                (self.first_ids[1] + sphere) as u32,
+            ),
+            blocks: [triangle_blocks as u32, sphere_blocks as u32],
+            ids: [triangle_ids.get_mut(triangle..)?, sphere_ids.get_mut(sphere..)?],
+            id_counts: [0; 2],
+            open: (u32::MAX, [u32::MAX; TRIANGLES]),
+            runs: self.runs,
+            run_count: runs,
+        };
+        let mut listed = [0; 2];
+        for word in self.words.chunks_mut(CHUNK).nth(chunk)? {
+            let Some((list, cell_box)) = lists.of(*word) else { continue };
+            let first = match cell_box {
+                Some(cell_box) => box_word(emitter.cell_box(cell_box)?),
+                None => run_word(emitter.run_count as u32),
+            };
+            *word = first;
+            let before = emitter.id_counts;
+            emitter.list(list)?;
+            let spheres = emitter.id_counts[1] - before[1];
+            listed = [listed[0] + list.len() - spheres, listed[1] + spheres];
+        }
+        let Emitter { packer, ids, id_counts, run_count, .. } = emitter;
+        // Numbers of triangles that were in the open block when they were listed again.
+        ids.into_iter().zip(id_counts).zip(listed).try_for_each(|((ids, from), to)| {
+            ids.get_mut(from..to)?.fill(0);
+            Some(())
+        })?;
+        self.used = Used {
+            ids: [triangle + listed[0], sphere + listed[1]],
+            sphere_blocks: sphere_blocks + listed[1].div_ceil(SPHERES),
+            triangle_blocks: triangle_blocks + packer.triangle_block_count(),
+            runs: run_count,
+        };
+        Some(())
+    }
+}
+
+/// What a chunk is packed to.
+struct Emitter<'s, 'a, 'b> {
+    shapes: Shapes<'s, 'a>,
+    packer: Packer<'b>,
+    /// So many blocks of triangles and of spheres are before those of the packer.
+    blocks: [u32; 2],
+    /// The numbers of triangles and of spheres, and how many there are.
+    ids: [&'b mut [u32]; 2],
+    id_counts: [usize; 2],
+    /// The triangle block being filled, and whose are its lanes.
+    open: (u32, [u32; TRIANGLES]),
+    runs: &'b mut [Run],
+    run_count: usize,
+}
+
+impl Emitter<'_, '_, '_> {
+    /// Writes the box of a cell before its run, and returns its entry.
+    fn cell_box(&mut self, cell_box: CellBox) -> Option<u32> {
+        *self.runs.get_mut(self.run_count)? = Run::of_box(cell_box);
+        self.run_count += 1;
+        Some(self.run_count as u32 - 1)
+    }
+
+    /// Packs a list.
+    ///
+    /// A primitive is stored again for each cell that lists it, unless the block being filled holds it already.
+    fn list(&mut self, list: &[u32]) -> Option<()> {
+        let first = self.run_count;
+        for id in list {
+            let (block, lane) = self.pack(id & !END)?;
+            let is_same =
+                self.run_count > first && self.runs.get(self.run_count - 1)?.block == block;
+            if !is_same {
+                *self.runs.get_mut(self.run_count)? = Run { block, lanes: 0 };
+                self.run_count += 1;
+            }
+            self.runs.get_mut(self.run_count - 1)?.lanes |= 1 << lane;
+        }
+        self.runs.get_mut(self.run_count - 1)?.lanes |= LAST;
+        Some(())
+    }
+
+    /// The block and the lane of a primitive: where it is in the open block, or a new place.
+    fn pack(&mut self, id: u32) -> Option<(u32, u32)> {
+        let (open, ids) = &mut self.open;
+        if let Some(lane) = ids.iter().position(|other| *other == id) {
+            return Some((*open, lane as u32));
+        }
+        let shape = self.shapes.get(id)?;
+        let (block, lane) = self.packer.push(&shape)?;
+        let is_sphere = block >= block_ref(KIND_SPHERES, 0);
+        let block = block + self.blocks[usize::from(is_sphere)];
+        if !is_sphere {
+            if block != *open {
+                (*open, *ids) = (block, [u32::MAX; TRIANGLES]);
+            }
+            *ids.get_mut(lane as usize)? = id;
+        }
+        let next = &mut self.id_counts[usize::from(is_sphere)];
+        *self.ids[usize::from(is_sphere)].get_mut(*next)? = id;
+        *next += 1;
+        Some((block, lane))
+    }
+}
+
+/// Lets the words and runs of a part, which count from its begin, count from that of all; `None` if they are not what
+/// [`Part::pack`] made them.
+pub(super) fn settle(words: &mut [u32], runs: &mut [Run], before: &Used) -> Option<()> {
+    let mut runs = runs.iter_mut();
+    for word in words {
+        match cell(*word) {
+            Cell::Empty | Cell::Grid(_) => continue,
+            Cell::Boxed(_) => drop(runs.next()?),
+            Cell::Run(_) => {}
+        }
+        *word += before.runs as u32;
+        loop {
+            let run = runs.next()?;
+            let is_sphere = run.block >= block_ref(KIND_SPHERES, 0);
+            let blocks = if is_sphere { before.sphere_blocks } else { before.triangle_blocks };
+            run.block += blocks as u32;
+            if run.is_last() {
+                break;
+            }
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,164 @@
+//! Sorts primitives by the cell of their centre.
+
+use super::front;
+use crate::block::Census;
+use crate::caller::{Caller, PARTS};
+use crate::grid::list::List;
+use crate::grid::space::Space;
+use crate::math::Aabb;
+use crate::prim::{GRAIN, Shape, for_each_prim_in};
+use crate::scene::Scene;
+use crate::storage::view_mut;
+use core::ops::Range;
+
+/// What is to be sorted, and by which cells.
+pub(super) struct Sorter<'s> {
+    pub scene: &'s Scene<'s, 's>,
+    pub census: &'s Census,
+    pub space: &'s Space,
+}
+
+/// Pairs of a cell and the number of a primitive.
+type Pairs<'p> = List<'p, [u32; 2]>;
+
+impl Sorter<'_> {
+    /// Fills `ids` with the numbers of triangles and then of spheres, both in the order of cells. `words` are counters, and in `scratch` there is
+    /// room for two words for each primitive.
+    pub fn sort(
+        &self,
+        words: &mut [u32],
+        ids: &mut [u32],
+        scratch: &mut [u8],
+        caller: &Caller,
+    ) -> Option<()> {
+        let words_in_scratch = scratch.len() / size_of::<u32>();
+        let scratch = view_mut::<u32>(scratch, 0, words_in_scratch)?.as_chunks_mut().0;
+        let mut pairs = List::new(scratch);
+        self.find_cells(&mut pairs, caller)?;
+        let triangle_count = self.census.triangle_count as usize;
+        let (triangles, spheres) = ids.split_at_mut(triangle_count);
+        // The numbers of triangles are before those of spheres.
+        let (triangle_pairs, sphere_pairs) = pairs.all().split_at(triangle_count);
+        sort_pairs(triangle_pairs, words, triangles, caller)?;
+        sort_pairs(sphere_pairs, words, spheres, caller)
+    }
+
+    /// Writes down the cell of each primitive, in the order of their numbers.
+    fn find_cells(&self, pairs: &mut Pairs, caller: &Caller) -> Option<()> {
+        let limit = self.census.prim_limit as usize;
+        // Parts have room for primitives that cannot be hit, too, as they may be anywhere.
+        let parted = pairs.rest().len() >= limit;
+        let size = if parted { caller.part_size(limit, GRAIN) } else { limit };
+        let (mut jobs, mut room) = ([const { None }; PARTS], pairs.free());
+        for (job, start) in jobs.iter_mut().zip((0..limit).step_by(size)) {
+            let ids = start..limit.min(start + size);
+            let (own, rest) = room.split(ids.len() as u64, (limit - start) as u64);
+            room = rest;
+            *job = Some((ids, own, None));
+        }
+        caller.for_each(&mut jobs, |job| {
+            if let Some((ids, pairs, done)) = job {
+                *done = self.find_cells_of(ids.clone(), pairs);
+            }
+        });
+        let pieces = jobs.map(|job| job.map(|(_, pairs, done)| done.map(|()| pairs.piece())));
+        for piece in pieces.into_iter().flatten() {
+            pairs.join(piece?);
+        }
+        Some(())
+    }
+
+    fn find_cells_of(&self, ids: Range<usize>, pairs: &mut Pairs) -> Option<()> {
+        let (range, sound) = (ids.start as u32..ids.end as u32, self.census.ignored_count == 0);
+        let mut full = false;
+        for_each_prim_in(self.scene, range, sound, |prim| {
+            full |= pairs.push([self.cell_of(&prim.shape) as u32, prim.id]).is_none();
+        });
+        (!full).then_some(())
+    }
+
+    fn cell_of(&self, shape: &Shape) -> usize {
+        let Aabb { lower, upper } = shape.aabb();
+        let [lower, upper] = [lower, upper].map(|p| self.space.point(p));
+        self.space.number(self.space.cell_of([0, 1, 2].map(|k| (lower[k] + upper[k]) / 2.0)))
+    }
+}
+
+/// A counting sort in which each thread sorts what is in some of the cells.
+fn sort_pairs(
+    pairs: &[[u32; 2]],
+    words: &mut [u32],
+    ids: &mut [u32],
+    caller: &Caller,
+) -> Option<()> {
+    if ids.is_empty() {
+        return Some(());
+    }
+    let size = words.len().div_ceil(caller.worker_count());
+    let mut jobs = [const { None }; PARTS];
+    for (job, (i, words)) in jobs.iter_mut().zip(words.chunks_mut(size).enumerate()) {
+        *job = Some(Cells { first: i * size, words, count: 0, ids: &mut [] });
+    }
+    caller.for_each(&mut jobs, |job| {
+        if let Some(cells) = job {
+            cells.count(pairs);
+        }
+    });
+    let mut ids = ids;
+    for cells in jobs.iter_mut().flatten() {
+        cells.ids = front(&mut ids, cells.count)?;
+    }
+    caller.for_each(&mut jobs, |job| {
+        if let Some(cells) = job {
+            cells.fill(pairs);
+        }
+    });
+    Some(())
+}
+
+/// Cells that follow each other, and what is in them.
+struct Cells<'p> {
+    /// The number of the first.
+    first: usize,
+    words: &'p mut [u32],
+    count: usize,
+    ids: &'p mut [u32],
+}
+
+impl Cells<'_> {
+    fn word(&mut self, cell: u32) -> Option<&mut u32> {
+        self.words.get_mut((cell as usize).wrapping_sub(self.first))
+    }
+
+    /// Leaves in each word where the cell's ids begin.
+    fn count(&mut self, pairs: &[[u32; 2]]) {
+        self.words.fill(0);
+        for [cell, _] in pairs {
+            if let Some(count) = self.word(*cell) {
+                *count += 1;
+            }
+        }
+        self.count = counts_to_starts(self.words) as usize;
+    }
+
+    fn fill(&mut self, pairs: &[[u32; 2]]) {
+        for [cell, id] in pairs {
+            if let Some(next) = self.word(*cell) {
+                let place = *next as usize;
+                *next += 1;
+                if let Some(out) = self.ids.get_mut(place) {
+                    *out = *id;
+                }
+            }
+        }
+    }
+}
+
+/// Replaces each count by the sum of those before it; returns the sum of all.
+pub(super) fn counts_to_starts(words: &mut [u32]) -> u32 {
+    let mut sum = 0;
+    for word in words {
+        (*word, sum) = (sum, sum + *word);
+    }
+    sum
+}
