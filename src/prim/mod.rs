@@ -14,7 +14,7 @@ pub(crate) use gather::{
 pub(crate) use names::digest;
 pub(crate) use pack::{Packer, pack_in_order};
 pub(crate) use refit::refit_leaves;
-pub(crate) use shapes::{AHEAD, Shapes, Source};
+pub(crate) use shapes::{Shapes, Source};
 pub(crate) use validate::leaves_are_sound;
 
 use crate::block::Block;

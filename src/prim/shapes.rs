@@ -7,7 +7,7 @@ use crate::scene::{Mesh, Scene};
 use crate::simd::prefetch;
 
 /// So many ids ahead shapes are fetched: about one fetch from memory takes as long.
-pub(crate) const AHEAD: usize = 16;
+const AHEAD: usize = 16;
 
 /// Where shapes are looked up.
 #[derive(Clone, Copy)]
@@ -35,9 +35,21 @@ impl<'s, 'a> Shapes<'s, 'a> {
         Source { scene, geometries, named: false }.shapes()
     }
 
+    /// Has shapes fetched that come soon: first the indices, then what they name. `next` gives the number of the shape
+    /// that comes so many later.
+    #[inline]
+    pub fn look_ahead(&self, next: impl Fn(usize) -> Option<u32>) {
+        if let Some(id) = next(2 * AHEAD) {
+            self.prefetch(id);
+        }
+        if let Some(id) = next(AHEAD) {
+            self.prefetch_vertices(id);
+        }
+    }
+
     /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
     #[inline]
-    pub fn prefetch(&self, id: u32) {
+    fn prefetch(&self, id: u32) {
         let Some((first, mesh)) = &self.mesh else { return };
         if let Some(index) = mesh.first_index(id.wrapping_sub(*first) as usize) {
             prefetch(index);
@@ -46,7 +58,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
 
     /// Has the vertices of a shape fetched, if it is of the last one's mesh; its indices had better be in the cache.
     #[inline]
-    pub fn prefetch_vertices(&self, id: u32) {
+    fn prefetch_vertices(&self, id: u32) {
         let Some((first, mesh)) = &self.mesh else { return };
         if let Some(vertices) = mesh.first_words(id.wrapping_sub(*first) as usize) {
             vertices.into_iter().for_each(prefetch);
