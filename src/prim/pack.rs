@@ -1,6 +1,7 @@
 //! Fills leaf blocks, each to the end before the next.
 
-use super::gather::{Shape, for_each_named_in, geometries};
+use super::gather::{Shape, geometries};
+use super::visit::for_each_named_in;
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock,
     block_ref,
