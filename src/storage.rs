@@ -66,25 +66,35 @@ pub(crate) fn view_mut<T: Plain>(
     Some(unsafe { core::slice::from_raw_parts_mut(part.as_mut_ptr().cast::<T>(), count) })
 }
 
-/// Has the system put finished bytes into large pages, where it can: rays visit them here and there, and with small
-/// pages many visits would wait for the table of pages.
-#[cfg(all(feature = "std", target_os = "linux", target_arch = "x86_64", not(miri)))]
+/// Has the system give large pages to bytes that are not yet written: a build then waits for a page every two megabytes.
+#[cfg(feature = "alloc")]
+fn want_large_pages(bytes: &[u8]) {
+    const MADV_HUGEPAGE: i32 = 14;
+    advise(bytes, MADV_HUGEPAGE);
+}
+
+/// Has the system put finished bytes into large pages, where it can and has not yet: rays visit them here and there, and
+/// with small pages many visits would wait for the table of pages.
+#[cfg(feature = "alloc")]
 fn use_large_pages(bytes: &[u8]) {
+    const MADV_COLLAPSE: i32 = 25;
+    want_large_pages(bytes);
+    advise(bytes, MADV_COLLAPSE);
+}
+
+/// Gives the system advice on those bytes that make up large pages.
+#[cfg(all(feature = "std", target_os = "linux", target_arch = "x86_64", not(miri)))]
+fn advise(bytes: &[u8], advice: core::ffi::c_int) {
     use core::ffi::{c_int, c_void};
     unsafe extern "C" {
         fn madvise(start: *mut c_void, size: usize, advice: c_int) -> c_int;
     }
     const LARGE: usize = 2 << 20;
-    const MADV_HUGEPAGE: c_int = 14;
-    const MADV_COLLAPSE: c_int = 25;
     let start = bytes.as_ptr();
     let ahead = start.addr().wrapping_neg() % LARGE;
     let size = bytes.len().saturating_sub(ahead) / LARGE * LARGE;
-    if size == 0 {
-        return;
-    }
-    let start = start.wrapping_add(ahead).cast_mut().cast();
-    for advice in [MADV_HUGEPAGE, MADV_COLLAPSE] {
+    if size > 0 {
+        let start = start.wrapping_add(ahead).cast_mut().cast();
         // SAFETY: whole pages of one allocation, whose bytes stay as they are. Systems that do not know the advice
         // refuse it, which does not matter.
         unsafe { madvise(start, size, advice) };
@@ -95,7 +105,7 @@ fn use_large_pages(bytes: &[u8]) {
     feature = "alloc",
     not(all(feature = "std", target_os = "linux", target_arch = "x86_64", not(miri)))
 ))]
-fn use_large_pages(_bytes: &[u8]) {}
+fn advise(_bytes: &[u8], _advice: i32) {}
 
 /// Zero bytes from the global allocator, aligned as blocks are.
 ///
@@ -122,6 +132,7 @@ impl AlignedMemory {
         // which are zero.
         let memory =
             unsafe { alloc::vec::Vec::from_raw_parts(memory, layout.size(), layout.size()) };
+        want_large_pages(&memory);
         let start = Self::start(&memory);
         Some(AlignedMemory { memory, start, size })
     }

@@ -142,9 +142,9 @@ fn with_less_memory_wide_leaves_fill_up_and_then_the_layout_is_compact() {
                 let Memory { size, minimum, .. } = structure.needs(scene);
                 with_copy(&full, |full| {
                     let full = Accel::open(full).expect("sound");
-                    for step in 0..=20 {
+                    for step in 0..=60 {
                         // Odd sizes too: the memory need not end on a line.
-                        let between = minimum + (size - minimum) * step / 20;
+                        let between = minimum + (size - minimum) * step / 60;
                         with_memory(between, 0, |m| {
                             let built = structure.build(scene, m).expect("enough");
                             match built.info().layout {

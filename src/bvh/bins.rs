@@ -16,6 +16,8 @@ pub(crate) struct Effort {
     samples: usize,
     /// Whether only the axis is looked at along which the centres are furthest apart.
     one_axis: bool,
+    /// Whether refs that may be one leaf stay together, as long as they are even: the collapse would seldom part them.
+    pub whole: bool,
     /// Triangles at most that go as one, each with an edge of the one before.
     pub strip: usize,
     /// Above this unevenness of the refs more is done.
@@ -25,17 +27,30 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    pub const FAST: Effort =
-        Effort { bins: 16, samples: 64, one_axis: true, strip: 4, even: 64.0, cuts: false };
-    pub const BALANCED: Effort =
-        Effort { bins: 16, samples: 512, one_axis: false, strip: 2, even: 64.0, cuts: false };
-    pub const BEST: Effort =
-        Effort { bins: BINS, samples: ALL, one_axis: false, strip: 1, even: 4.0, cuts: true };
+    pub const FAST: Effort = Effort {
+        bins: 16,
+        samples: 64,
+        one_axis: true,
+        whole: true,
+        strip: 4,
+        even: 64.0,
+        cuts: false,
+    };
+    pub const BALANCED: Effort = Effort { samples: 512, one_axis: false, strip: 2, ..Effort::FAST };
+    pub const BEST: Effort = Effort {
+        bins: BINS,
+        samples: ALL,
+        one_axis: false,
+        whole: false,
+        strip: 1,
+        even: 4.0,
+        cuts: true,
+    };
 
     /// The effort where few refs are much larger than the others, such as the walls of a building: a sample says nothing
     /// of them, and where they are parted matters. `None` for scenes that are even enough.
     pub fn for_uneven(self, unevenness: f64) -> Option<Effort> {
-        let uneven = Effort { bins: BINS, samples: ALL, one_axis: false, ..self };
+        let uneven = Effort { bins: BINS, samples: ALL, one_axis: false, whole: false, ..self };
         (unevenness > self.even).then_some(uneven)
     }
 }

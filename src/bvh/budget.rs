@@ -3,14 +3,14 @@
 /// The fewest leaves that `count` refs can always be brought into by halving, and by parting
 /// kinds at the end when both occur.
 ///
-/// By induction: what is at most a leaf is one leaf, or two of different kinds; what is more, `leaf_max + 1` at
-/// least, has halves of at least `half`, the lesser half of that, and `count / half` is superadditive.
+/// By induction: what is at most a leaf is one leaf, or two of different kinds; `leaf_max + 1` refs are two leaves, or
+/// four; and the floor of what is in proportion to that is superadditive.
 pub(super) fn fewest_leaves(count: usize, mixed: bool, leaf_max: usize) -> usize {
-    let half = leaf_max.div_ceil(2).max(1);
+    let two = leaf_max + 1;
     match (count, mixed) {
         (0 | 1, _) => count,
-        (_, false) => (count / half).max(1),
-        (_, true) => (2 * count / half).max(2),
+        (_, false) => (2 * count / two).max(1),
+        (_, true) => (4 * count / two).max(2),
     }
 }
 

@@ -9,7 +9,7 @@ use super::tree::Grown;
 use crate::block::BvhNode;
 use crate::block::leaf::{SPHERES, TRIANGLES};
 use crate::math::Aabb;
-use crate::prim::{AHEAD, Shape, Shapes};
+use crate::prim::{Shape, Shapes};
 
 /// What becomes of an inner node.
 ///
@@ -180,9 +180,8 @@ impl<const W: usize> Decided<W> {
         self.content.kind = Kind::Triangles;
         let first = node.first as usize;
         // Leaves come from the last to the first.
-        let ahead = first.saturating_sub(AHEAD)..(first + count).saturating_sub(AHEAD);
-        for id in ids.get(ahead).into_iter().flatten() {
-            shapes.prefetch(*id);
+        for i in first..first + count {
+            shapes.look_ahead(|n| ids.get(i.checked_sub(n)?).copied());
         }
         let triangles =
             ids.get(first..first + count)?.iter().filter_map(|id| match shapes.get(*id)? {

@@ -6,7 +6,7 @@ use super::branch::{grow, unevenness};
 use super::budget::leaf_budget;
 use super::refs::{PrimRef, gather};
 use super::split::Areas;
-use super::tree::{Grown, Limits};
+use super::tree::{Depth, Grown, Limits};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
 use crate::error::BuildError;
@@ -103,7 +103,8 @@ fn grow_tree(
     let unevenness = unevenness(refs, Areas::new(&census.bounds), how.caller);
     let effort = how.effort.for_uneven(unevenness).unwrap_or(how.effort);
     let leaves = plan.leaves;
-    let limits = Limits { leaves, source: None, leaf_max: LEAF_MAX, mixed, deep: false, effort };
+    let limits =
+        Limits { leaves, source: None, leaf_max: LEAF_MAX, mixed, depth: Depth::Paying, effort };
     let node_count = grow(nodes, refs, plan.ref_count, &limits, how.caller)?.nodes;
     // Triangles first, then spheres, each in the order of the leaves.
     let mut ids = prim_ids.iter_mut();

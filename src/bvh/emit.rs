@@ -193,7 +193,7 @@ mod tests {
     use crate::bvh::collapse::{Grounds, LEAF};
     use crate::bvh::refs::PrimRef;
     use crate::bvh::split::Areas;
-    use crate::bvh::tree::Limits;
+    use crate::bvh::tree::{Depth, Limits};
     use crate::caller::Caller;
     use crate::math::Aabb;
     use crate::prim::Source;
@@ -223,7 +223,7 @@ mod tests {
             source: None,
             leaf_max: 1,
             mixed: false,
-            deep: true,
+            depth: Depth::Deep,
             effort: Effort::BALANCED,
         };
         let caller = &Caller::new(None, None);

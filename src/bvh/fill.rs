@@ -4,7 +4,7 @@ use super::emit::BEGINS;
 use crate::block::PartsMut;
 use crate::block::leaf::{SphereBlock, TriangleBlock};
 use crate::caller::{Caller, PARTS};
-use crate::prim::{AHEAD, GRAIN, Packer, Source};
+use crate::prim::{GRAIN, Packer, Source};
 use crate::scene::Scene;
 
 /// The ids of some leaf blocks, and those blocks.
@@ -59,9 +59,7 @@ impl Run<'_> {
         let mut packer = Packer::new(triangles, spheres, first, first_sphere);
         let mut shapes = source.shapes();
         for i in 0..self.ids.len() {
-            if let Some(id) = self.ids.get(i + AHEAD) {
-                shapes.prefetch(id & !BEGINS);
-            }
+            shapes.look_ahead(|n| self.ids.get(i + n).map(|id| id & !BEGINS));
             let id = self.ids.get_mut(i)?;
             if *id & BEGINS != 0 {
                 packer.close();

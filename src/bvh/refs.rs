@@ -9,7 +9,7 @@ use crate::block::Census;
 use crate::caller::{Caller, PARTS};
 use crate::kinds::{BALLS, REFIT, THREADS, WIDE};
 use crate::math::Aabb;
-use crate::prim::{GRAIN, Prim, Shape, for_each_named_in, for_each_prim_in};
+use crate::prim::{GRAIN, Names, Shape, Visitor, box_around, for_each_named_in, visit};
 use crate::scene::Scene;
 use crate::storage::Plain;
 
@@ -151,7 +151,7 @@ pub(crate) fn refs_per_prim(
 /// How many of these can be hit.
 fn hittable(scene: &Scene, ids: &Range<usize>) -> usize {
     let mut count = 0;
-    for_each_prim_in(scene, ids.start as u32..ids.end as u32, false, |_| count += 1);
+    for_each_named_in(scene, ids.start as u32..ids.end as u32, false, |_, _| count += 1);
     count
 }
 
@@ -167,27 +167,7 @@ impl Part<'_> {
     /// it does not matter where parts begin.
     fn gather(&mut self, scene: &Scene, census: &Census, strips: Option<(usize, Areas)>) {
         let ids = self.ids.start as u32..self.ids.end as u32;
-        let sound = census.ignored_count == 0;
-        // The last triangle.
-        let mut last: Option<(u32, [[f32; 3]; 3])> = None;
-        for_each_named_in(scene, ids, sound, |Prim { id, shape }, names| {
-            let refit = REFIT && census.refit;
-            let aabb = if refit { shape.place(&census.bounds) } else { shape.aabb() };
-            let new = PrimRef::new(id, &aabb, !shape.is_triangle());
-            let shape = if refit { names.of(shape) } else { shape };
-            let (Some(strips), Shape::Triangle(corners)) = (strips.filter(|_| WIDE), shape) else {
-                return self.push(new);
-            };
-            let follows = last.is_some_and(|(one, other)| {
-                one + 1 == id
-                    && !(id as usize).is_multiple_of(GRAIN)
-                    && share_edge(&other, &corners)
-            });
-            if !(follows && self.extend(&new, strips)) {
-                self.push(new);
-            }
-            last = Some((id, corners));
-        });
+        visit(scene, ids, &mut Gathering { part: self, census, strips, last: None });
     }
 
     #[inline(always)]
@@ -203,6 +183,49 @@ impl Part<'_> {
     fn extend(&mut self, new: &PrimRef, (most, areas): (usize, Areas)) -> bool {
         let last = self.count.checked_sub(1).and_then(|i| self.refs.get_mut(i));
         last.is_some_and(|last| last.count() < most && last.extend(new, areas))
+    }
+}
+
+/// Refs being written.
+struct Gathering<'p, 'r> {
+    part: &'p mut Part<'r>,
+    census: &'p Census,
+    strips: Option<(usize, Areas)>,
+    /// The last triangle.
+    last: Option<(u32, [[f32; 3]; 3])>,
+}
+
+impl Visitor for Gathering<'_, '_> {
+    #[inline(always)]
+    fn triangle(&mut self, id: u32, corners: Option<[[f32; 3]; 3]>, names: Names) {
+        let Some(mut corners) = corners else { return };
+        let census = self.census;
+        let mut aabb = box_around(corners);
+        if REFIT && census.refit {
+            aabb = Shape::Triangle(corners).place(&census.bounds);
+            corners = names.corners().unwrap_or(corners);
+        } else if census.ignored_count > 0 && Shape::Triangle(corners).sound().is_none() {
+            return;
+        }
+        let new = PrimRef::new(id, &aabb, false);
+        let Some(strips) = self.strips.filter(|_| WIDE) else { return self.part.push(new) };
+        let follows = self.last.is_some_and(|(one, other)| {
+            one + 1 == id && !(id as usize).is_multiple_of(GRAIN) && share_edge(&other, &corners)
+        });
+        if !(follows && self.part.extend(&new, strips)) {
+            self.part.push(new);
+        }
+        self.last = Some((id, corners));
+    }
+
+    #[inline(always)]
+    fn other(&mut self, id: u32, shape: Shape) {
+        let census = self.census;
+        let counts = census.ignored_count == 0 || shape.sound().is_some();
+        let aabb = if REFIT && census.refit { shape.place(&census.bounds) } else { shape.aabb() };
+        if counts {
+            self.part.push(PrimRef::new(id, &aabb, true));
+        }
     }
 }
 

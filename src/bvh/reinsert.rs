@@ -249,7 +249,7 @@ mod tests {
     use crate::bvh::branch::grow;
     use crate::bvh::refs::PrimRef;
     use crate::bvh::tree::tests::{levels, series};
-    use crate::bvh::tree::{Grown, Limits};
+    use crate::bvh::tree::{Depth, Grown, Limits};
     use crate::caller::Caller;
     use std::vec::Vec;
 
@@ -264,7 +264,7 @@ mod tests {
             source: None,
             leaf_max: 5,
             mixed: false,
-            deep: true,
+            depth: Depth::Deep,
             effort: Effort::FAST,
         };
         let caller = &Caller::new(None, None);

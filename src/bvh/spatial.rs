@@ -224,7 +224,7 @@ mod tests {
     use crate::block::{BvhNode, Geometry};
     use crate::bvh::bins::Effort;
     use crate::bvh::branch::grow;
-    use crate::bvh::tree::{Grown, Limits};
+    use crate::bvh::tree::{Depth, Grown, Limits};
     use crate::caller::Caller;
     use crate::prim::{Shape, Source};
     use crate::scene::{Mesh, Scene};
@@ -266,7 +266,7 @@ mod tests {
             source: Some(Source { scene: &scene, geometries: &geometries, named: false }),
             leaf_max: 5,
             mixed: false,
-            deep: true,
+            depth: Depth::Deep,
             effort: Effort::BEST,
         };
         let caller = &Caller::new(None, None);

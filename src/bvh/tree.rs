@@ -52,10 +52,21 @@ pub(crate) struct Limits<'s, 'a> {
     pub leaf_max: usize,
     /// Whether there are triangles and spheres: a leaf is of one kind.
     pub mixed: bool,
-    /// Whether to split as long as the leaves last, and not as long as it pays.
-    pub deep: bool,
+    /// How far refs that may be one leaf are parted.
+    pub depth: Depth,
     /// How carefully planes are chosen.
     pub effort: Effort,
+}
+
+/// How far refs that may be one leaf are parted.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Depth {
+    /// Not at all.
+    Whole,
+    /// As long as it pays.
+    Paying,
+    /// As long as the leaves last.
+    Deep,
 }
 
 /// Cost of a step to two children, in tests of one primitive.
@@ -151,14 +162,15 @@ impl Splitter<'_, '_, '_> {
         extent: &Extent,
         bins: &mut Bins,
     ) -> Option<Split> {
-        let (Limits { leaf_max, effort, .. }, areas) = (*self.limits, self.areas);
-        // Only wide trees are deep.
-        let (mixed, deep) = (SPHERES && self.limits.mixed, WIDE && self.limits.deep);
+        let (Limits { leaf_max, depth, effort, .. }, areas) = (*self.limits, self.areas);
+        let mixed = SPHERES && self.limits.mixed;
+        // Only wide trees are not parted just as long as it pays.
+        let depth = if WIDE { depth } else { Depth::Paying };
         let count = refs.len();
         let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
         let one_kind = !mixed || spheres == 0 || spheres == count;
         let may_be_leaf = count <= leaf_max && one_kind;
-        if may_be_leaf && (count == 1 || task.budget < 2) {
+        if may_be_leaf && (count == 1 || task.budget < 2 || depth == Depth::Whole) {
             return None;
         }
         let least = |left_count: usize| self.fewest([left_count, count - left_count]);
@@ -169,7 +181,8 @@ impl Splitter<'_, '_, '_> {
         };
         let lasts = |left_count: usize| self.lasts(task, [left_count, count - left_count]);
         let sah = if count <= FEW {
-            let sweep = sweep(refs, areas, lasts).filter(|s| !may_be_leaf || deep || pays(s.work));
+            let sweep = sweep(refs, areas, lasts)
+                .filter(|s| !may_be_leaf || depth == Depth::Deep || pays(s.work));
             sweep.map(|s| split_at(refs, s.left_count, least(s.left_count)))
         } else {
             // None when all centres are in one point.
@@ -278,13 +291,13 @@ pub(super) mod tests {
     fn no_scene_is_deeper_than_the_stack() {
         let mut deepest = 0;
         for ratio in [1.1f64, 1.3, 1.5, 2.0, 3.0, 4.0, 8.0] {
-            for (leaf_max, deep) in [(5, true), (6, false)] {
+            for (leaf_max, depth) in [(5, Depth::Deep), (6, Depth::Paying)] {
                 let count = (240.0 / ratio.log2()) as usize;
                 let leaves = leaf_budget(count, false, leaf_max, true);
                 let mut refs = series(count, ratio);
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
                 let effort = Effort::BALANCED;
-                let limits = Limits { leaves, source: None, leaf_max, mixed: false, deep, effort };
+                let limits = Limits { leaves, source: None, leaf_max, mixed: false, depth, effort };
                 let caller = &Caller::new(None, None);
                 let used = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");
                 let levels = levels(&nodes[..used.nodes]);

@@ -11,7 +11,7 @@ use super::fill::pack;
 use super::refs::{PrimRef, gather, refs_per_prim};
 use super::reinsert::mend;
 use super::split::Areas;
-use super::tree::Limits;
+use super::tree::{Depth, Limits};
 use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, Geometry, KIND_BVH, PartsMut};
@@ -220,13 +220,14 @@ fn grow_tree(
     let (front, refs) = front.split_at_mut_checked(places.refs)?;
     let slots = storage::view_mut::<PrimRef>(refs, 0, places.room)?;
     let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
+    let effort = uneven.unwrap_or(how.effort);
     let limits = Limits {
         leaves: places.leaves,
         source: cut.then_some(Source { scene, geometries, named: false }),
         leaf_max: leaf_max(census, strip),
         mixed: census.is_mixed(),
-        deep: true,
-        effort: uneven.unwrap_or(how.effort),
+        depth: if effort.whole { Depth::Whole } else { Depth::Deep },
+        effort,
     };
     let size = grow(nodes, slots, count, &limits, how.caller)?;
     let (free, ids) = ids_to_end(refs, &size)?;
@@ -237,9 +238,9 @@ fn grow_tree(
 }
 
 /// So many refs, of as many as there would be at the least, and strips are not worth it.
-const FOLLOWED: f32 = 1.4;
+const FOLLOWED: f32 = 1.6;
 
-/// Refs of up to `strip` triangles, and the leaves that a tree over them takes.
+/// Refs of up to `strip` triangles, and the leaves that a tree over them may have.
 struct Gathered {
     count: usize,
     strip: usize,
@@ -262,9 +263,10 @@ fn gather_strips(
     }
     loop {
         let count = gather(scene, census, strip, how.caller, refs);
-        let leaves = leaf_budget(count, mixed, leaf_max(census, strip), false);
+        let least = leaf_budget(count, mixed, leaf_max(census, strip), false);
         // Where strips are shorter than they may be, there may be more leaves than room for them.
-        if leaves <= room || strip == 1 {
+        if least <= room || strip == 1 {
+            let leaves = room.min(count / 2).max(least);
             return Gathered { count, strip, leaves };
         }
         strip /= 2;

@@ -30,12 +30,9 @@ impl Aabb {
     /// Grows the box until it holds `other`. Of equal zeros the box's own stays, on every machine.
     pub fn add(&mut self, other: &Aabb) {
         for k in 0..3 {
-            if other.lower[k] < self.lower[k] {
-                self.lower[k] = other.lower[k];
-            }
-            if other.upper[k] > self.upper[k] {
-                self.upper[k] = other.upper[k];
-            }
+            let [lower, upper] = [self.lower[k], self.upper[k]];
+            self.lower[k] = if other.lower[k] < lower { other.lower[k] } else { lower };
+            self.upper[k] = if other.upper[k] > upper { other.upper[k] } else { upper };
         }
     }
 

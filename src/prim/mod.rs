@@ -1,21 +1,24 @@
 //! What can be hit: the layer that list, grid and BVH stand on.
 
+mod census;
 mod gather;
 mod names;
 mod pack;
 mod refit;
 mod shapes;
 mod validate;
+mod visit;
 
-pub(crate) use gather::{
-    GRAIN, Prim, Shape, Survey, for_each_counted, for_each_named_in, for_each_prim_in, geometries,
-    geometry_table, survey,
-};
+pub(crate) use gather::{GRAIN, Shape, Survey, box_around, geometries, geometry_table, survey};
+pub(crate) use names::Names;
 pub(crate) use names::digest;
 pub(crate) use pack::{Packer, pack_in_order};
 pub(crate) use refit::refit_leaves;
-pub(crate) use shapes::{AHEAD, Shapes, Source};
+pub(crate) use shapes::{Shapes, Source};
 pub(crate) use validate::leaves_are_sound;
+pub(crate) use visit::{
+    Prim, Visitor, for_each_counted, for_each_named_in, for_each_prim_in, visit,
+};
 
 use crate::block::Block;
 use crate::block::leaf::{

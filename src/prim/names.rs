@@ -24,8 +24,13 @@ impl Names<'_, '_> {
     /// The shape with names in place of vertices.
     #[inline]
     pub fn of(self, shape: Shape) -> Shape {
-        let names = self.0.and_then(|(mesh, first, i)| mesh.names(first, i as usize));
-        names.map_or(shape, Shape::Triangle)
+        self.corners().map_or(shape, Shape::Triangle)
+    }
+
+    /// The names of the corners, if they have any.
+    #[inline]
+    pub fn corners(self) -> Option<[[f32; 3]; 3]> {
+        self.0.and_then(|(mesh, first, i)| mesh.names(first, i as usize))
     }
 }
 

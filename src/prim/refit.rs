@@ -2,7 +2,7 @@
 
 use super::Leaves;
 use super::gather::Shape;
-use super::shapes::{AHEAD, Shapes, Source};
+use super::shapes::{Shapes, Source};
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock};
 use crate::caller::{Caller, PARTS};
 use crate::math::Aabb;
@@ -68,13 +68,7 @@ impl Entries<'_> {
         let count = held.count_ones() as usize;
         block.clear();
         for entry in self.first..self.first.saturating_add(count) {
-            // First the indices, then what they name.
-            if let Some(id) = self.ids.get(entry.saturating_add(2 * AHEAD)) {
-                shapes.prefetch(*id);
-            }
-            if let Some(id) = self.ids.get(entry.saturating_add(AHEAD)) {
-                shapes.prefetch_vertices(*id);
-            }
+            shapes.look_ahead(|n| self.ids.get(entry.saturating_add(n)).copied());
             let shape = self.ids.get(entry).and_then(|id| shapes.get(*id)?.sound());
             if let Some(shape) = shape {
                 block.take(entry - self.first, &shape);

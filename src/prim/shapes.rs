@@ -8,7 +8,7 @@ use crate::scene::{Mesh, Scene};
 use crate::simd::prefetch;
 
 /// So many ids ahead shapes are fetched: about one fetch from memory takes as long.
-pub(crate) const AHEAD: usize = 16;
+const AHEAD: usize = 16;
 
 /// Where shapes are looked up.
 #[derive(Clone, Copy)]
@@ -46,7 +46,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
 
     /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
     #[inline]
-    pub fn prefetch(&self, id: u32) {
+    fn prefetch(&self, id: u32) {
         let Some((first, mesh)) = &self.mesh else { return };
         if let Some(index) = mesh.first_index(id.wrapping_sub(*first) as usize) {
             prefetch(index);
@@ -55,7 +55,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
 
     /// Has the vertices of a shape fetched, if it is of the last one's mesh; its indices had better be in the cache.
     #[inline]
-    pub fn prefetch_vertices(&self, id: u32) {
+    fn prefetch_vertices(&self, id: u32) {
         let Some((first, mesh)) = &self.mesh else { return };
         if let Some(vertices) = mesh.first_words(id.wrapping_sub(*first) as usize) {
             vertices.into_iter().for_each(prefetch);

@@ -300,7 +300,6 @@ impl<S: Simd> LateRay<S> {
     pub fn t_scale(&self) -> f64 {
         f64::from(self.scales.t)
     }
-
 }
 
 /// A ray that is prepared when that is needed. What comes of it is kept elsewhere: it is lent to what is out of line, and

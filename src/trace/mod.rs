@@ -174,8 +174,12 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         Bundles::Sixteen(bundles) if WIDE => {
             bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query)
         }
-        Bundles::Eight(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query),
-        Bundles::Four(bundles) if WIDE => bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query),
+        Bundles::Eight(bundles) if WIDE => {
+            bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query)
+        }
+        Bundles::Four(bundles) if WIDE => {
+            bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query)
+        }
         _ => {
             if prepared.is_none() {
                 *prepared = Some(late.prepare());

@@ -1,5 +1,7 @@
 //! From lists of numbers to leaf blocks and runs: the finished block.
 
+use core::ops::Range;
+
 use super::Attempt;
 use super::grow::Grown;
 use super::lists::keep;
@@ -67,11 +69,14 @@ impl Tallies {
     fn new(words: &[u32], lists: Lists, caller: &Caller) -> Self {
         let size = caller.part_size(words.len(), CHUNK);
         let (mut parts, mut all) = ([None; PARTS], Tally::default());
-        let made = caller.map_parts(words.len(), size, |part| lists.tally(&words[part]));
-        for (part, tally) in parts.iter_mut().zip(made) {
+        let mut places = parts.iter_mut();
+        let tally = |part: Range<usize>| lists.tally(&words[part]);
+        caller.for_parts(words.len(), size, tally, |tally| {
             all.add(&tally);
-            *part = Some(tally);
-        }
+            if let Some(place) = places.next() {
+                *place = Some(tally);
+            }
+        });
         Tallies { size, parts, all }
     }
 

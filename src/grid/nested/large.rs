@@ -42,30 +42,30 @@ impl Large {
             found.bounds[1] = census.bounds;
             return found;
         }
-        let parts = in_parts(scene, census, caller, |part, prim| {
+        let long = |part: &mut Large, prim: Prim| {
             let length = length(&prim.shape.aabb());
             if length > least {
                 part.insert(length, prim.id);
             }
-        });
-        for part in parts {
+        };
+        in_parts(scene, census, caller, long, |part| {
             for i in 0..part.count {
                 found.insert(part.lengths[i], part.ids[i]);
             }
-        }
+        });
         if found.count == 0 {
             found.bounds[1] = census.bounds;
             return found;
         }
         found.ids[..found.count].sort_unstable();
         let known = found;
-        let parts = in_parts(scene, census, caller, |part, prim| {
+        let bound = |part: &mut Large, prim: Prim| {
             let side = usize::from(!known.has(prim.id));
             part.bounds[side].add(&prim.shape.aabb());
-        });
-        for part in parts {
+        };
+        in_parts(scene, census, caller, bound, |part| {
             (0..2).for_each(|side| found.bounds[side].add(&part.bounds[side]));
-        }
+        });
         found
     }
 
@@ -93,20 +93,22 @@ impl Large {
     }
 }
 
-/// What `work` makes of the primitives of each part, in order.
+/// Gives `take` what `work` makes of the primitives of each part, in order.
 fn in_parts(
     scene: &Scene,
     census: &Census,
     caller: &Caller,
     work: impl Fn(&mut Large, Prim) + Sync,
-) -> impl Iterator<Item = Large> {
+    take: impl FnMut(Large),
+) {
     let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
-    caller.map_parts(limit, caller.part_size(limit, GRAIN), move |ids| {
+    let made = |ids: Range<usize>| {
         let mut part = Large::NONE;
         let ids = ids.start as u32..ids.end as u32;
         for_each_prim_in(scene, ids, sound, |prim| work(&mut part, prim));
         part
-    })
+    };
+    caller.for_parts(limit, caller.part_size(limit, GRAIN), made, take);
 }
 
 /// All others with these numbers.

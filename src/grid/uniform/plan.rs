@@ -1,5 +1,7 @@
 //! How fine the grid is, and how much memory that takes.
 
+use core::ops::Range;
+
 use super::pack::most_blocks;
 use crate::block::cells::{MOST_CELLS, VALUE, cell_count};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
@@ -120,13 +122,17 @@ impl Plan {
 /// How often cells refer to primitives: a bound on the entries of all runs.
 fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) -> u64 {
     let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
-    let sums = caller.map_parts(limit, caller.part_size(limit, GRAIN), |ids| {
+    let in_part = |ids: Range<usize>| {
         let mut sum = 0u64;
         for_each_prim_in(scene, ids.start as u32..ids.end as u32, sound, |prim| {
             let cells = space.range_of(&prim.shape.aabb()).cell_count();
             sum = sum.saturating_add(cells);
         });
         sum
+    };
+    let mut all = 0u64;
+    caller.for_parts(limit, caller.part_size(limit, GRAIN), in_part, |sum| {
+        all = all.saturating_add(sum);
     });
-    sums.fold(0, u64::saturating_add)
+    all
 }
