@@ -48,7 +48,13 @@ const HOUSE: &[(&str, &[&str])] = &[
     ),
     ("surface", &["exact", "instance", "interval", "math"]),
     ("trace", &["block", "bvh", "grid", "kinds", "math", "prim", "query", "ray", "simd"]),
-    ("batch", &["block", "bvh", "math", "prim", "query", "ray", "sieve", "simd", "trace"]),
+    (
+        "batch",
+        &[
+            "block", "bvh", "grid", "kinds", "math", "prim", "query", "ray", "sieve", "simd",
+            "trace",
+        ],
+    ),
     (
         "levels",
         &["batch", "block", "bvh", "instance", "math", "prim", "query", "ray", "simd", "trace"],

@@ -4,8 +4,8 @@
 
 mod common;
 
-use common::All;
 use common::batch::{camera, far, same_in_a_batch, with_odd_ones};
+use common::{All, odd_models};
 use raykern::{Backend, Ray};
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
@@ -31,6 +31,25 @@ fn incoherent_rays() {
         for count in [2, 11, 12, 13, 31, 32, 33, 40, 1_000] {
             let hits = same_in_a_batch("far", &far.accel(), &rays[..count]);
             assert!(count < 1_000 || hits > 100, "{hits}");
+        }
+    }
+}
+
+/// Grids are walked through side by side: all sorts of rays in one batch, through all sorts of scenes.
+#[test]
+fn rays_of_all_families() {
+    let made = make::ALL.into_iter().map(|(name, make)| (name, make(2_000)));
+    for (name, model) in odd_models().into_iter().chain(made) {
+        let families = [Family::ORDINARY.as_slice(), &Family::HOSTILE, &[Family::Invalid]].concat();
+        let rays: Vec<Vec<Ray>> = (0..)
+            .zip(&families)
+            .map(|(seed, family)| RayMaker::new(&model, seed).many(*family, 60))
+            .collect();
+        // One of each after the other.
+        let rays: Vec<Ray> = (0..60).flat_map(|i| rays.iter().map(move |rays| rays[i])).collect();
+        let all = All::of(&model);
+        for (kind, accel) in &all.accels() {
+            same_in_a_batch(&format!("{name} {kind}"), accel, &rays);
         }
     }
 }

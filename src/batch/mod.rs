@@ -1,12 +1,14 @@
 //! Many rays through one block: as one where they are alike, as a stream where they begin together, and else several in
-//! flight.
+//! flight; through a grid sixteen side by side.
 
 mod flights;
 mod packet;
 mod stream;
+mod walkers;
 
 use crate::block::bundle::Bundle;
-use crate::block::{Block, Bundles, Finished};
+use crate::block::{Block, Bundles, Finished, KIND_GRID};
+use crate::kinds::{GRID, WIDE};
 use crate::query::Query;
 use crate::ray::{Alike, Hit, Ray};
 use crate::simd::{self, Kernel, Simd};
@@ -17,6 +19,8 @@ use crate::trace::{Question, Together, ask};
 const NEAR: [usize; 2] = [2 << 20, 16 << 20];
 /// Of blocks of fewer bytes, so much is visited by all rays that they go together wherever they begin.
 const SMALL: usize = 128 << 10;
+/// Fewer rays through a grid are faster one by one: making place for sixteen takes as long as some five rays.
+const MANY: usize = 64;
 /// How far apart two rays begin that have nothing to do with each other, of the scene's largest coordinate.
 const FAR: f32 = 1.0 / 64.0;
 /// So many rays are looked at for that.
@@ -72,12 +76,13 @@ pub(crate) fn ask_in<'m, Q: Together<'m>, A: Record<Q::Answer>>(
 ) {
     // Only for the layout that is chosen automatically: others would be more copies of the code.
     let parts = &block.parts();
-    match parts.bundles {
-        Bundles::Sixteen(bundles) if rays.len() > 1 => {
-            simd::dispatch(Batch { block: parts, bundles, rays, answers, question, manner });
-        }
-        _ => ask_each(block, rays, answers, question),
-    }
+    let bundles = match parts.bundles {
+        _ if rays.len() < 2 => return ask_each(block, rays, answers, question),
+        Bundles::Sixteen(bundles) if WIDE => bundles,
+        _ if GRID && parts.header.kind == KIND_GRID && rays.len() >= MANY => &[],
+        _ => return ask_each(block, rays, answers, question),
+    };
+    simd::dispatch(Batch { block: parts, bundles, rays, answers, question, manner });
 }
 
 /// The same, one ray after the other.
@@ -95,6 +100,7 @@ pub(crate) fn ask_each<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>>(
 /// Rays that ask the same question, and where their answers go.
 struct Batch<'a, 'm, Q: Question<'m>, A> {
     block: &'a Block<'m>,
+    /// None of a grid.
     bundles: &'m [Bundle<16>],
     rays: &'a [Ray],
     answers: &'a mut [A],
@@ -110,6 +116,9 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
         if !S::FLIES {
             let Batch { block, rays, answers, question, .. } = self;
             return ask_each(block.whole, rays, answers, question);
+        }
+        if GRID && self.block.header.kind == KIND_GRID {
+            return self.walk(s);
         }
         let count = self.rays.len().min(self.answers.len());
         let (mut first, mut room) = (0, None);

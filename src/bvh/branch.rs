@@ -277,6 +277,7 @@ mod tests {
     use super::*;
     use crate::bvh::bins::Effort;
     use crate::bvh::budget::leaf_budget;
+    use crate::bvh::tree::Depth;
     use crate::bvh::tree::tests::series;
     use std::vec::Vec;
 
@@ -285,8 +286,14 @@ mod tests {
         let count = 20_000;
         let leaves = leaf_budget(count, false, 6, true);
         let effort = Effort::BALANCED;
-        let limits =
-            Limits { leaves, source: None, leaf_max: 6, mixed: false, deep: false, effort };
+        let limits = Limits {
+            leaves,
+            source: None,
+            leaf_max: 6,
+            mixed: false,
+            depth: Depth::Paying,
+            effort,
+        };
         let (refs, caller) = (series(count, 1.001), Caller::new(None, None));
         let extent = Extent::around(&refs);
         let areas = Areas::new(&extent.bounds.aabb());

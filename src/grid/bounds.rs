@@ -11,7 +11,7 @@ use super::overlap::cells_near;
 use super::ray::CellRay;
 use super::space::Space;
 use super::steps::Level;
-use super::walk::time_above;
+use super::way::time_above;
 use super::{FINEST, dilation};
 use crate::math::{Aabb, wide};
 use crate::prim::Shape;
@@ -19,7 +19,7 @@ use crate::ray::{PreparedRay, Ray};
 use crate::simd::Scalar;
 
 /// A box that may be flat, far from zero, or both.
-fn bounds(random: &mut Random) -> Aabb {
+pub(super) fn bounds(random: &mut Random) -> Aabb {
     let size = 2f32.powi(random.below(100) as i32 - 80);
     let mut aabb = Aabb::EMPTY;
     for k in 0..3 {
@@ -59,7 +59,7 @@ fn point_in(random: &mut Random, aabb: &Aabb) -> [f32; 3] {
 }
 
 /// From within 2^30 grids to a point of the box.
-fn ray_to(random: &mut Random, aabb: &Aabb) -> Option<PreparedRay> {
+pub(super) fn ray_to(random: &mut Random, aabb: &Aabb) -> Option<PreparedRay> {
     let (from, to) = (point_in(random, aabb), point_in(random, aabb));
     let size = (wide(aabb.upper) - wide(aabb.lower)).max_element();
     let away = 2f64.powi(random.below(40) as i32 - 9);

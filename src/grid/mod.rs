@@ -1,7 +1,7 @@
 //! Grids in flat arrays: uniform ones, and grids within the cells of grids.
 //!
 //! [`uniform`] builds the plain grid, [`nested`] one whose full cells are divided again. A ray goes through both the same way:
-//! [`walk`] follows it from cell to cell, by the steps of [`steps`], in the coordinates of [`ray`].
+//! [`walk`] follows it from cell to cell along its [`way`], by the steps of [`steps`], in the coordinates of [`ray`].
 
 #[cfg(test)]
 mod bounds;
@@ -16,11 +16,15 @@ mod steps;
 mod uniform;
 mod validate;
 mod walk;
+mod walks;
+mod way;
 
 pub use options::{GridKind, GridOptions};
 pub(crate) use search::search;
 pub(crate) use validate::grids_are_sound;
-pub(crate) use walk::{Cells, walk};
+pub(crate) use walk::{Cells, from_afar, visit, walk};
+pub(crate) use walks::{Found, Walks};
+pub(crate) use way::{Entry, Way};
 
 use crate::block::Census;
 use crate::caller::Caller;

@@ -33,9 +33,9 @@ pub(super) struct Level<V> {
     /// The word of the cell.
     pub place: u32,
     /// The word of the cell with the lowest turned coordinates.
-    corner: u32,
+    pub corner: u32,
     /// From a cell's word to the next one's along each axis; below zero, by wrapping, along turned ones.
-    strides: [u32; 3],
+    pub strides: [u32; 3],
 }
 
 /// An inner grid is left earlier than the cell that it is in by this part of `t`. In that time the ray moves by this part of the way
@@ -106,6 +106,49 @@ impl<V: Lanes<4>> Level<V> {
         level
     }
 
+    /// Of each axis `from`, `speed`, `pace`, `wall` and `last`.
+    #[inline(always)]
+    pub fn axes(&self) -> [[f32; 5]; 3] {
+        let mut columns = [[0.0; 4]; 5];
+        let all = [self.from, self.speed, self.pace, self.wall, self.last];
+        for (column, v) in columns.iter_mut().zip(all) {
+            v.store(column);
+        }
+        let [from, speed, pace, wall, last] = columns;
+        [0, 1, 2].map(|k| [from[k], speed[k], pace[k], wall[k], last[k]])
+    }
+
+    /// When the walk came into its cell, and when it leaves the grid.
+    #[inline(always)]
+    pub fn times_of_grid(&self) -> [f32; 2] {
+        let [mut entered, mut exit] = [[0.0; 4]; 2];
+        self.entered.store(&mut entered);
+        self.exit.store(&mut exit);
+        [entered[0], exit[0]]
+    }
+
+    /// The walk of which these are the [axes](Self::axes) and the [times](Self::times_of_grid).
+    #[inline(always)]
+    pub fn of_axes<S: Simd + Width<4, V = V>>(
+        s: S,
+        [x, y, z]: [[f32; 5]; 3],
+        [entered, exit]: [f32; 2],
+        (place, corner, strides): (u32, u32, [u32; 3]),
+    ) -> Self {
+        Level {
+            from: Width::<4>::load(s, &[x[0], y[0], z[0], 0.0]),
+            speed: Width::<4>::load(s, &[x[1], y[1], z[1], 1.0]),
+            pace: Width::<4>::load(s, &[x[2], y[2], z[2], 1.0]),
+            wall: Width::<4>::load(s, &[x[3], y[3], z[3], 1.0]),
+            last: Width::<4>::load(s, &[x[4], y[4], z[4], 1.0]),
+            entered: Width::<4>::splat(s, entered),
+            exit: Width::<4>::splat(s, exit),
+            place,
+            corner,
+            strides,
+        }
+    }
+
     /// The times at which the walls ahead are passed.
     #[inline(always)]
     fn times(&self) -> V {
@@ -122,15 +165,15 @@ impl<V: Lanes<4>> Level<V> {
         word
     }
 
-    /// The times between which the ray is in a box in the cell; `None` if it is not up to the bound.
+    /// Whether the ray is in a box in the cell up to the bound, and between which times.
     #[inline(always)]
-    pub fn part_in<S: Simd + Width<4, V = V>>(
+    pub fn times_in<S: Simd + Width<4, V = V>>(
         &self,
         s: S,
         cell_box: CellBox,
         sides: Sides<V>,
         bound: V,
-    ) -> Option<[f32; 2]> {
+    ) -> (bool, [f32; 2]) {
         let [lower, upper] = [cell_box.lower, cell_box.upper].map(|corner| corner.map(i32::from));
         let (lower, upper) = (s.floats(lower), s.floats(upper));
         let half = upper.sub(lower).mul(Width::<4>::splat(s, CellBox::STEP / 2.0)).mul(self.pace);
@@ -139,13 +182,11 @@ impl<V: Lanes<4>> Level<V> {
         let middle = middle.sub(self.from).mul(self.pace);
         let near = s.largest_of_three(middle.sub(half));
         let far = s.least_of_three(middle.add(half));
-        if near.less_or_equal(far.min(bound)) & 1 == 0 {
-            return None;
-        }
+        let is_in = near.less_or_equal(far.min(bound)) & 1 == 1;
         let [mut begin, mut end] = [[0.0; 4]; 2];
         near.store(&mut begin);
         far.store(&mut end);
-        Some([begin[0], end[0]])
+        (is_in, [begin[0], end[0]])
     }
 
     /// Whether the walk came into its cell before the bound.
@@ -245,15 +286,25 @@ pub(super) struct Sides<V> {
 }
 
 impl<V: Lanes<4>> Sides<V> {
+    /// Of each axis half a step and the beginning.
+    #[inline(always)]
+    pub fn axes(&self) -> [[f32; 2]; 3] {
+        let [mut half_step, mut begin] = [[0.0; 4]; 2];
+        self.half_step.store(&mut half_step);
+        self.begin.store(&mut begin);
+        [0, 1, 2].map(|k| [half_step[k], begin[k]])
+    }
+
     #[inline(always)]
     pub fn new<S: Simd + Width<4, V = V>>(s: S, turned: [u32; 3]) -> Self {
-        let (mut half_step, mut begin) = ([0.0; 4], [0.0; 4]);
-        for k in 0..3 {
-            let falls = turned[k] != 0;
-            half_step[k] = if falls { -CellBox::STEP / 2.0 } else { CellBox::STEP / 2.0 };
-            begin[k] = if falls { 1.0 - CellBox::BEGIN } else { CellBox::BEGIN };
+        let [x, y, z] = turned.map(|falls| f32::from_bits(falls & 1 << 31));
+        let signs = Width::<4>::load(s, &[x, y, z, 0.0]);
+        // From the other wall along a turned axis: both sums are exact.
+        let begin = Width::<4>::splat(s, CellBox::BEGIN - 0.5).flipped_by(signs);
+        Sides {
+            half_step: Width::<4>::splat(s, CellBox::STEP / 2.0).with_sign_of(signs),
+            begin: begin.add(Width::<4>::splat(s, 0.5)),
         }
-        Sides { half_step: Width::<4>::load(s, &half_step), begin: Width::<4>::load(s, &begin) }
     }
 }
 

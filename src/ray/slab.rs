@@ -7,7 +7,7 @@ use super::{Interval, PreparedRay};
 use crate::math::float::less;
 use crate::math::rounding::{UNIT32, f32_above, f32_below, gamma};
 use crate::math::{Aabb, wide};
-use crate::simd::{Lanes, SMALL, Scalar, Width, mul_sub};
+use crate::simd::{Lanes, SMALL, Scalar, Simd, Width, mul_sub};
 
 /// A ray made ready for boxes.
 ///
@@ -19,6 +19,12 @@ use crate::simd::{Lanes, SMALL, Scalar, Width, mul_sub};
 pub(crate) trait Slab {
     /// The part of the ray inside the box.
     fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32>;
+
+    /// The same by a backend's vectors of an axis a lane: the same bits.
+    #[inline(always)]
+    fn part_by<S: Simd>(&self, _: S, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
+        self.part(aabb, t_bound)
+    }
 
     /// The same for `N` boxes at once.
     fn wide<'a, S: Width<N> + 'a, const N: usize>(&'a self, s: S) -> impl WideBoxes<S, N> + 'a;
@@ -121,6 +127,26 @@ impl Slab for NarrowSlab {
             }
         }
         Interval { near, far }
+    }
+
+    /// The wall that comes first is the one whose product is less, as rounding keeps order.
+    #[inline(always)]
+    fn part_by<S: Simd>(&self, s: S, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
+        if SMALL {
+            return self.part(aabb, t_bound);
+        }
+        let ([a, b, c], [x, y, z]) = (aabb.lower, aabb.upper);
+        let r = Width::<4>::load(s, &self.reciprocal);
+        let lower = Width::<4>::load(s, &[a, b, c, 0.0]).mul(r);
+        let upper = Width::<4>::load(s, &[x, y, z, 0.0]).mul(r);
+        let enter = lower.min(upper).sub(Width::<4>::load(s, &self.near_shift));
+        let leave = lower.max(upper).sub(Width::<4>::load(s, &self.far_shift));
+        let near = s.largest_of_three(enter).max(Width::<4>::splat(s, self.t_min));
+        let far = s.least_of_three(leave).min(Width::<4>::splat(s, t_bound));
+        let [mut first, mut last] = [[0.0; 4]; 2];
+        near.store(&mut first);
+        far.store(&mut last);
+        Interval { near: first[0], far: last[0] }
     }
 
     #[inline(always)]
