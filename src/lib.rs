@@ -33,7 +33,7 @@
 //! | feature | adds | costs |
 //! |---|---|---|
 //! | `std` (default) | `alloc`, `full`; square roots from std; panics stopped at the C boundary | std |
-//! | `full` | all kinds of blocks: `wide`, `grid`, `spheres`, `instances`, `refit`, each for itself as well | their code |
+//! | `full` | all kinds of blocks: `wide`, `grid`, `spheres`, `instances`, `refit`, and `threads` for builds, each for itself as well | their code |
 //! | `alloc` | [`OwnedAccel`] | a global allocator |
 //! | `parallel` | `Rayon`, threads for [`BuildOptions::threads`] | std and the crate rayon |
 //! | `libm` | square roots without std | the crate libm |

@@ -61,10 +61,13 @@ cargo_for() {
 # PANICS is `freestanding`: it is held to that for microcontrollers.
 library() {
     local panics=${3:-panic-free}
-    local folder=$work/lib-$panics-${2//,/-}
+    local folder=$work/lib
+    local archive=$folder/$1-$panics-${2//,/-}.a
     (cd .. && CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked -p raykern-c --profile embedded \
         --no-default-features --features "$panics${2:+,$2}" --target "$1" --crate-type staticlib) >&2
-    echo "$folder/$1/embedded/libraykern.a"
+    # The next one, with other features, takes its place.
+    cp "$folder/$1/embedded/libraykern.a" "$archive"
+    echo "$archive"
 }
 
 # agree TARGET KIND FLAGS: where the crate `agree` is.
@@ -245,7 +248,10 @@ page() { # Rust target, -, browser
     local folder=$work/page shot=$work/page.png
     CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path ../examples/wasm/Cargo.toml --release \
         --target "$1" -- -C linker=wasm-ld >&2
-    cp "$folder/$1/release/page.wasm" ../examples/wasm/
+    # Takes off a tenth; what it may use is what every browser has known for years, and the compiler uses.
+    install wasm-opt binaryen
+    wasm-opt -Oz --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --enable-mutable-globals \
+        --enable-reference-types --enable-multivalue "$folder/$1/release/page.wasm" -o ../examples/wasm/page.wasm
     cost bytes "$(wc -c <../examples/wasm/page.wasm)"
     [ -z "${PAGE_ONLY:-}" ] || return 0
     install "$3" chromium

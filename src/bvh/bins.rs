@@ -76,8 +76,8 @@ impl Binning {
         // Few refs leave most bins empty.
         let bins = (4 + count / 8).min(most);
         let mut scale = [0.0; 4];
-        for k in 0..4 {
-            scale[k] = bins as f32 / (centres.upper[k] - centres.lower[k]);
+        for ((scale, upper), lower) in scale.iter_mut().zip(centres.upper).zip(centres.lower) {
+            *scale = bins as f32 / (upper - lower);
         }
         Binning { lower: centres.lower, scale, bins, last: (bins - 1) as f32 }
     }

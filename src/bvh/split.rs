@@ -82,8 +82,8 @@ impl Areas {
     pub fn of_finite(self, all: &Box4) -> f32 {
         let s = self.0;
         let mut edges = [0.0; 4];
-        for k in 0..4 {
-            edges[k] = all.upper[k] * s - all.lower[k] * s;
+        for ((edge, upper), lower) in edges.iter_mut().zip(all.upper).zip(all.lower) {
+            *edge = upper * s - lower * s;
         }
         let [x, y, z, _] = edges;
         x * y + y * z + z * x
