@@ -65,6 +65,13 @@ static void check_grids(const RtScene *scene) {
         info.struct_size = sizeof info;
         CHECK(rt_accel_info(grid, &info) == RT_OK && info.kind == RT_KIND_GRID);
         CHECK((kind == RT_GRID_OCTREE) == (info.resolution[0] == 2));
+        double cells = (double)info.resolution[0] * info.resolution[1] * info.resolution[2];
+        bool half = cells > 0.3 * info.triangle_count && cells < 0.7 * info.triangle_count;
+        CHECK((kind == RT_GRID_UNIFORM) == half);
+        // Nothing is worth dividing here but the cells of an octree.
+        options.grid_depth = 1;
+        bool same = rt_accel_size(built(scene, true, &options)) == rt_accel_size(grid);
+        CHECK(same == (kind != RT_GRID_OCTREE));
         for (int i = 0; i < 100; i++) {
             RtRay ray = {{(float)(i % 10) / 7, (float)i / 70, 3}, 0, {0.01f, 0.02f, -1}, 9};
             RtHit a, b;
