@@ -1,7 +1,8 @@
 //! Grids in flat arrays: uniform ones, and grids within the cells of grids.
 //!
 //! [`uniform`] builds the plain grid, [`nested`] one whose full cells are divided again. A ray goes through both the same way:
-//! [`walk`] follows it from cell to cell along its [`way`], by the steps of [`steps`], in the coordinates of [`ray`].
+//! [`walk`] follows it from cell to cell along its [`way`], by the steps of [`steps`], in the coordinates of [`ray`]. [`walks`] are sixteen
+//! of those side by side.
 
 #[cfg(test)]
 mod bounds;
