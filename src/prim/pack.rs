@@ -104,7 +104,8 @@ impl<'b> Packer<'b> {
         leaf
     }
 
-    fn push_triangle(&mut self, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
+    /// Adds a triangle.
+    pub fn push_triangle(&mut self, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
         let fill = &mut self.triangles;
         let open = fill.blocks.checked_sub(1).and_then(|b| self.triangle_blocks.get(b));
         let fits = open.is_some_and(|block| {
