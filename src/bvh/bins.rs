@@ -46,6 +46,11 @@ impl Effort {
         cuts: true,
     };
 
+    /// Of so many refs every so-many-th is in the bins.
+    pub fn step(&self, count: usize) -> usize {
+        if count < 2 * self.samples { 1 } else { count / self.samples }
+    }
+
     /// The effort where few refs are much larger than the others, such as the walls of a building: a sample says nothing
     /// of them, and where they are parted matters. `None` for scenes that are even enough.
     pub fn for_uneven(self, unevenness: f64) -> Option<Effort> {
@@ -153,9 +158,7 @@ pub(crate) fn best_plane(
         axis.bounds[..binning.bins].fill(Box4::EMPTY);
         axis.counts[..binning.bins].fill(0);
     }
-    let all = refs.len() < 2 * effort.samples;
-    let step = if all { 1 } else { refs.len() / effort.samples };
-    let sample = refs.iter().step_by(step);
+    let sample = refs.iter().step_by(effort.step(refs.len()));
     if effort.one_axis {
         for r in sample {
             axes[first].add(r, binning.bins_of(r)[first]);

@@ -69,7 +69,9 @@ pub(crate) fn grow(
     for (task, root) in tasks.iter().zip(roots) {
         *nodes.get_mut(task.node as usize)? = root;
     }
-    close_gaps(nodes, slots)
+    let size = close_gaps(nodes, slots)?;
+    close_boxes(nodes.get_mut(..size.nodes)?);
+    Some(size)
 }
 
 /// Branches at most. How many there are must not depend on the threads, as the tree must not.
@@ -181,6 +183,22 @@ pub(super) fn unevenness(refs: &[PrimRef], areas: Areas, caller: &Caller) -> f64
 /// Parts that do not depend on the threads, as sums are rounded.
 fn part_size(refs: &[PrimRef]) -> usize {
     refs.len().div_ceil(PARTS).max(GRAIN)
+}
+
+/// Gives nodes whose boxes were left open those of their children, which come after them.
+fn close_boxes(nodes: &mut [BvhNode]) {
+    for i in (0..nodes.len()).rev() {
+        let node = &nodes[i];
+        if node.is_leaf() || node.lower[0] <= node.upper[0] {
+            continue;
+        }
+        let pair = node.first as usize;
+        if let Some([left, right]) = nodes.get(pair..pair + 2) {
+            let mut aabb = left.aabb();
+            aabb.add(&right.aabb());
+            nodes[i] = BvhNode::inner(&aabb, pair as u32);
+        }
+    }
 }
 
 /// Moves pairs of children, and the refs of leaves, down to where the ones before end.

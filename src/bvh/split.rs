@@ -97,8 +97,13 @@ impl Extent {
     pub const EMPTY: Extent = Extent { bounds: Box4::EMPTY, centres: Box4::EMPTY };
 
     pub fn around(refs: &[PrimRef]) -> Extent {
+        Extent::of_sample(refs, 1)
+    }
+
+    /// That of every `step`-th ref.
+    pub fn of_sample(refs: &[PrimRef], step: usize) -> Extent {
         let mut extent = Extent::EMPTY;
-        for r in refs {
+        for r in refs.iter().step_by(step) {
             extent.bounds.add(&r.bounds);
             extent.centres.add(&Box4::at(centre(r)));
         }

@@ -6,7 +6,7 @@ use super::branch::Branch;
 use super::budget::{fewest_leaves, levels_to_halve};
 use super::refs::PrimRef;
 use super::spatial::{best_cut, overlap};
-use super::split::{Areas, Extent};
+use super::split::{Areas, Box4, Extent};
 use super::sweep::{FEW, sweep};
 use crate::block::BvhNode;
 use crate::kinds::{SPHERES, WIDE};
@@ -238,7 +238,7 @@ impl Splitter<'_, '_, '_> {
             // None when all centres are in one point.
             best_plane(refs, &task.extent.centres, areas, effort, bins).and_then(|plane| {
                 let left_count = plane.part(refs);
-                lasts(left_count).then(|| split_at(refs, left_count, least(left_count)))
+                lasts(left_count).then(|| self.split_at(refs, left_count))
             })
         };
         match sah {
@@ -247,9 +247,9 @@ impl Splitter<'_, '_, '_> {
             // Few, but of two kinds: each kind can be one leaf.
             None if SPHERES && count <= leaf_max => {
                 refs.sort_unstable_by_key(|r| (r.is_sphere(), r.id()));
-                Some(split_at(refs, count - spheres, [1, 1]))
+                Some(Split { least: [1, 1], ..self.split_at(refs, count - spheres) })
             }
-            None => Some(split_at(refs, count / 2, least(count / 2))),
+            None => Some(self.split_at(refs, count / 2)),
         }
     }
 
@@ -281,7 +281,7 @@ impl Splitter<'_, '_, '_> {
         }
         let counts = cut.part(slots, task.count, shapes)?;
         let refs = slots.get(..counts[0] + counts[1])?;
-        Some(Split { counts, ..split_at(refs, counts[0], self.fewest(counts)) })
+        Some(self.split_at(refs, counts[0]))
     }
 
     /// The fewest leaves that two sides need.
@@ -296,12 +296,19 @@ impl Splitter<'_, '_, '_> {
         let levels = levels_to_halve(counts[0].max(counts[1]), self.limits.leaf_max);
         left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
     }
-}
 
-fn split_at(refs: &[PrimRef], left_count: usize, least: [usize; 2]) -> Split {
-    let (left, right) = refs.split_at(left_count);
-    let counts = [left.len(), right.len()];
-    Split { counts, least, sides: [Extent::around(left), Extent::around(right)] }
+    /// The sides of a place between refs. Where a plane will be chosen by a sample, the centres are those of the sample and
+    /// the box is left open, as every pass over many refs takes its time.
+    fn split_at(self, refs: &[PrimRef], left_count: usize) -> Split {
+        let sides = refs.split_at(left_count);
+        let [left, right] = [sides.0, sides.1].map(|refs| {
+            let step = self.limits.effort.step(refs.len());
+            let extent = Extent::of_sample(refs, step);
+            if step == 1 { extent } else { Extent { bounds: Box4::EMPTY, ..extent } }
+        });
+        let counts = [sides.0.len(), sides.1.len()];
+        Split { counts, least: self.fewest(counts), sides: [left, right] }
+    }
 }
 
 #[cfg(test)]
