@@ -234,3 +234,51 @@ fn close_gaps(nodes: &mut [BvhNode], slots: &mut [PrimRef]) -> Option<Size> {
         size.nodes += 2;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::bins::Effort;
+    use crate::bvh::tree::Depth;
+    use std::vec::Vec;
+
+    #[test]
+    fn boxes_are_those_of_what_is_below() {
+        let mut state = 3u32;
+        let mut next = || {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            (state >> 16) as f32 / 65536.0
+        };
+        let mut refs: Vec<_> = (0..20_000)
+            .map(|id| {
+                let lower = [next(), next(), next()];
+                PrimRef::new(id, &Aabb { lower, upper: lower.map(|x| x + 0.01) }, false)
+            })
+            .collect();
+        let count = refs.len();
+        let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); count];
+        // Both choose planes of large nodes by samples.
+        for effort in [Effort::FAST, Effort::BALANCED] {
+            let (leaves, leaf_max, depth) = (count / 2, 4, Depth::Whole);
+            let limits = Limits { leaves, source: None, leaf_max, mixed: false, depth, effort };
+            let size = grow(&mut nodes, &mut refs, count, &limits, &Caller::new(None, None));
+            assert_eq!(size.map(|size| size.refs), Some(count));
+            let (mut pending, mut first) = (std::vec![0], 0);
+            while let Some(at) = pending.pop() {
+                let node = nodes[at];
+                let mut around = Aabb::EMPTY;
+                if node.is_leaf() {
+                    let end = first + Grown::ref_count(&node);
+                    refs[first..end].iter().for_each(|r| around.add(&r.bounds.aabb()));
+                    first = end;
+                } else {
+                    let pair = node.first as usize;
+                    nodes[pair..pair + 2].iter().for_each(|child| around.add(&child.aabb()));
+                    pending.extend([pair + 1, pair]);
+                }
+                assert_eq!(node.aabb(), around, "{at}");
+            }
+            assert_eq!(first, count);
+        }
+    }
+}
