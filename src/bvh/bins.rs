@@ -47,6 +47,11 @@ impl Effort {
         cuts: true,
     };
 
+    /// Of so many refs every so-many-th is in the bins.
+    pub fn step(&self, count: usize) -> usize {
+        if count < 2 * self.samples { 1 } else { count.checked_div(self.samples).unwrap_or(1) }
+    }
+
     /// The effort where few refs are much larger than the others, such as the walls of a building: a sample says nothing
     /// of them, and where they are parted matters. `None` for scenes that are even enough.
     pub fn for_uneven(self, unevenness: f64) -> Option<Effort> {
@@ -167,9 +172,7 @@ pub(crate) fn best_plane(
     Bins(axes): &mut Bins,
 ) -> Option<Plane> {
     let binning = Binning::new(centres, refs.len(), effort.bins);
-    // All of them, if they are less than twice as many as samples.
-    let step = refs.len() / effort.samples.max(1);
-    let sample = refs.iter().step_by(step.max(1));
+    let sample = refs.iter().step_by(effort.step(refs.len()));
     let first = if effort.one_axis { centres.widest() } else { 0 };
     let looked_at = if effort.one_axis { first..first + 1 } else { 0..3 };
     if !(SMALL || effort.one_axis) {

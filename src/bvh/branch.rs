@@ -12,6 +12,7 @@ use crate::caller::{Caller, PARTS};
 use crate::kinds::{THREADS, WIDE};
 use crate::math::Aabb;
 use crate::prim::GRAIN;
+use crate::simd::SMALL;
 
 /// How much a tree has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +64,11 @@ pub(crate) fn grow(
     } else {
         splitter.grow_at_once(root, nodes, slots)?;
     }
-    close_gaps(nodes, slots)
+    let size = close_gaps(nodes, slots)?;
+    if !SMALL {
+        close_boxes(nodes.get_mut(..size.nodes)?);
+    }
+    Some(size)
 }
 
 impl Splitter<'_, '_, '_> {
@@ -170,7 +175,8 @@ impl Splitter<'_, '_, '_> {
 
     /// The box around what a task splits, and what it is split into.
     fn children(self, task: &Task, slots: &mut [PrimRef]) -> Option<(Aabb, [Task; 2])> {
-        let extent = task.known.extent(slots.get(..task.count)?);
+        let refs = slots.get(..task.count)?;
+        let extent = task.known.extent(refs, self.step(refs));
         let split = self.part(slots, task, &extent, &mut self.scratch())?;
         Some((extent.bounds.aabb(), task.children(&split, task.pairs, slots)?))
     }
@@ -233,6 +239,22 @@ pub(super) fn unevenness(refs: &[PrimRef], areas: Areas, caller: &Caller) -> f64
 /// Parts that do not depend on the threads, as sums are rounded.
 fn part_size(refs: &[PrimRef]) -> usize {
     refs.len().div_ceil(PARTS).max(GRAIN)
+}
+
+/// Gives nodes whose boxes were left open those of their children, which come after them.
+fn close_boxes(nodes: &mut [BvhNode]) {
+    for i in (0..nodes.len()).rev() {
+        let node = &nodes[i];
+        if node.is_leaf() || node.lower[0] <= node.upper[0] {
+            continue;
+        }
+        let pair = node.first as usize;
+        if let Some([left, right]) = nodes.get(pair..pair + 2) {
+            let mut aabb = left.aabb();
+            aabb.add(&right.aabb());
+            nodes[i] = BvhNode::inner(&aabb, pair as u32);
+        }
+    }
 }
 
 /// Moves pairs of children, and the refs of leaves, down to where the ones before end.
@@ -315,5 +337,45 @@ mod tests {
             (nodes.iter().map(bits).collect::<Vec<_>>(), ids)
         };
         assert!(tree(true) == tree(false));
+    }
+
+    #[test]
+    fn boxes_are_those_of_what_is_below() {
+        let mut state = 3u32;
+        let mut next = || {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            (state >> 16) as f32 / 65536.0
+        };
+        let mut refs: Vec<_> = (0..20_000)
+            .map(|id| {
+                let lower = [next(), next(), next()];
+                PrimRef::new(id, &Aabb { lower, upper: lower.map(|x| x + 0.01) }, false)
+            })
+            .collect();
+        let count = refs.len();
+        let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); count];
+        // Both choose planes of large nodes by samples.
+        for effort in [Effort::FAST, Effort::BALANCED] {
+            let (leaves, leaf_max, depth) = (count / 2, 4, Depth::Whole);
+            let limits = Limits { leaves, source: None, leaf_max, mixed: false, depth, effort };
+            let size = grow(&mut nodes, &mut refs, count, &limits, &Caller::new(None, None));
+            assert_eq!(size.map(|size| size.refs), Some(count));
+            let (mut pending, mut first) = (std::vec![0], 0);
+            while let Some(at) = pending.pop() {
+                let node = nodes[at];
+                let mut around = Aabb::EMPTY;
+                if node.is_leaf() {
+                    let end = first + Grown::ref_count(&node);
+                    refs[first..end].iter().for_each(|r| around.add(&r.bounds.aabb()));
+                    first = end;
+                } else {
+                    let pair = node.first as usize;
+                    nodes[pair..pair + 2].iter().for_each(|child| around.add(&child.aabb()));
+                    pending.extend([pair + 1, pair]);
+                }
+                assert_eq!(node.aabb(), around, "{at}");
+            }
+            assert_eq!(first, count);
+        }
     }
 }

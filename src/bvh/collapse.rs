@@ -183,14 +183,19 @@ impl<const W: usize> Decided<W> {
         for i in first..first + count {
             shapes.look_ahead(|n| ids.get(i.checked_sub(n)?).copied());
         }
-        let triangles =
-            ids.get(first..first + count)?.iter().filter_map(|id| match shapes.get(*id)? {
-                Shape::Triangle(triangle) => Some(triangle),
-                Shape::Sphere { .. } | Shape::Box(_) => None,
-            });
-        self.content.corners.become_those_of(triangles);
+        let triangles = ids.get(first..first + count)?.iter();
+        self.content.corners.become_those_of(triangles.filter_map(|id| triangle(*id, shapes)));
         Some(())
     }
+}
+
+/// The corners of a triangle.
+#[inline(always)]
+fn triangle(id: u32, shapes: &mut Shapes) -> Option<[[f32; 3]; 3]> {
+    shapes.corners(id).or_else(|| match shapes.get(id)? {
+        Shape::Triangle(corners) => Some(corners),
+        Shape::Sphere { .. } | Shape::Box(_) => None,
+    })
 }
 
 fn join<const W: usize>(

@@ -65,7 +65,10 @@ impl Run<'_> {
                 packer.close();
             }
             *id &= !BEGINS;
-            packer.push(&shapes.get(*id)?)?;
+            match shapes.corners(*id) {
+                Some(corners) => packer.push_triangle(corners)?,
+                None => packer.push(&shapes.get(*id)?)?,
+            };
         }
         (packer.triangle_block_count() == block_count).then_some(())
     }

@@ -1,11 +1,12 @@
 //! Whether triangles fit into one leaf block: at most 16, over at most 16 vertices of distinct bits.
 
 use crate::block::leaf::{TRIANGLES, low_bits};
+use crate::prim::{Numbers, Vertices};
 
 /// The distinct vertices of a few triangles.
 #[derive(Clone, Copy)]
 pub(crate) struct Corners {
-    vertices: [[f32; TRIANGLES]; 3],
+    vertices: Vertices,
     count: usize,
 }
 
@@ -13,14 +14,13 @@ impl Corners {
     pub const NONE: Corners = Corners { vertices: [[0.0; TRIANGLES]; 3], count: 0 };
 
     /// Becomes those of a few triangles, which have 16 at the most. In place, as what was just written is slow to copy.
+    #[inline]
     pub fn become_those_of(&mut self, triangles: impl Iterator<Item = [[f32; 3]; 3]>) {
         self.count = 0;
-        for vertex in triangles.flatten() {
-            // One by one: what was just written is slow to search with vectors, too.
-            let known = |i| self.get(i).map(f32::to_bits) == vertex.map(f32::to_bits);
-            if !(0..self.count).any(known) {
-                self.set(self.count, vertex);
-                self.count += 1;
+        let mut numbers = Numbers::NONE;
+        for triangle in triangles {
+            for vertex in &triangle {
+                numbers.number(&mut self.vertices, vertex, &mut self.count);
             }
         }
     }

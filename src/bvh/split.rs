@@ -114,8 +114,13 @@ impl Extent {
 
     #[cfg_attr(target_os = "none", inline(never))]
     pub fn around(refs: &[PrimRef]) -> Extent {
+        Extent::of_sample(refs, 1)
+    }
+
+    /// That of every `step`-th ref.
+    pub fn of_sample(refs: &[PrimRef], step: usize) -> Extent {
         let mut extent = Extent::EMPTY;
-        for r in refs {
+        for r in refs.iter().step_by(step) {
             extent.bounds.add(&r.bounds);
             extent.centres.add(&Box4::at(centre(r)));
         }

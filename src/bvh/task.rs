@@ -37,10 +37,15 @@ pub(super) struct Known([Extent; KEPT]);
 const KEPT: usize = if SMALL { 0 } else { 1 };
 
 impl Known {
-    pub fn around(refs: &[PrimRef]) -> Known {
+    /// Those of one side of a split. Where a plane will be chosen by every `step`-th ref, the centres are those of these and
+    /// the box is left open, as every pass over many refs takes its time.
+    pub fn of_side(refs: &[PrimRef], step: usize) -> Known {
         let mut known = Known([Extent::EMPTY; KEPT]);
         for extent in &mut known.0 {
-            *extent = Extent::around(refs);
+            *extent = Extent::of_sample(refs, step);
+            if step > 1 {
+                extent.bounds = Box4::EMPTY;
+            }
         }
         known
     }
@@ -49,9 +54,13 @@ impl Known {
         Known([extent; KEPT])
     }
 
-    /// The boxes around the same refs.
-    pub fn extent(&self, refs: &[PrimRef]) -> Extent {
-        self.0.first().copied().unwrap_or_else(|| Extent::around(refs))
+    /// The same boxes, of the same refs.
+    pub fn extent(&self, refs: &[PrimRef], step: usize) -> Extent {
+        let again = || {
+            let Extent { bounds, .. } = Extent::around(refs);
+            Extent { bounds, ..Extent::of_sample(refs, step) }
+        };
+        self.0.first().copied().unwrap_or_else(again)
     }
 }
 

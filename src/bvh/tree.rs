@@ -113,7 +113,8 @@ impl<'s, 'a> Splitter<'_, 's, 'a> {
         while let Some(task) = stack.pop() {
             let first = task.first - whole.first;
             let slots = refs.get_mut(first..first + task.room)?;
-            let extent = task.known.extent(slots.get(..task.count)?);
+            let refs = slots.get(..task.count)?;
+            let extent = task.known.extent(refs, self.step(refs));
             let split = self.part(slots, &task, &extent, &mut scratch);
             let aabb = extent.bounds.aabb();
             let node = match &split {
@@ -173,7 +174,6 @@ impl Splitter<'_, '_, '_> {
         if may_be_leaf && (count == 1 || task.budget < 2 || depth == Depth::Whole) {
             return None;
         }
-        let least = |left_count: usize| self.fewest([left_count, count - left_count]);
         let pays = |work: f32| {
             let area = areas.of(&extent.bounds.aabb());
             // Everything on one line or in one point: any split is as good as another.
@@ -183,12 +183,12 @@ impl Splitter<'_, '_, '_> {
         let sah = if count <= FEW {
             let sweep = sweep(refs, areas, lasts)
                 .filter(|s| !may_be_leaf || depth == Depth::Deep || pays(s.work));
-            sweep.map(|s| split_at(refs, s.left_count, least(s.left_count)))
+            sweep.map(|s| self.split_at(refs, s.left_count))
         } else {
             // None when all centres are in one point.
             best_plane(refs, &extent.centres, areas, effort, bins).and_then(|plane| {
                 let left_count = plane.part(refs);
-                lasts(left_count).then(|| split_at(refs, left_count, least(left_count)))
+                lasts(left_count).then(|| self.split_at(refs, left_count))
             })
         };
         match sah {
@@ -197,9 +197,9 @@ impl Splitter<'_, '_, '_> {
             // Few, but of two kinds: each kind can be one leaf.
             None if SPHERES && count <= leaf_max => {
                 sort_few(refs, |r| (r.is_sphere(), r.id()));
-                Some(split_at(refs, count - spheres, [1, 1]))
+                Some(Split { least: [1, 1], ..self.split_at(refs, count - spheres) })
             }
-            None => Some(split_at(refs, count / 2, least(count / 2))),
+            None => Some(self.split_at(refs, count / 2)),
         }
     }
 
@@ -213,7 +213,9 @@ impl Splitter<'_, '_, '_> {
     ) -> Option<Split> {
         let refs = slots.get(..task.count)?;
         let (left, right) = refs.split_at_checked(split.counts[0])?;
-        let [left, right] = [split.sides[0].extent(left), split.sides[1].extent(right)];
+        let of_side =
+            |side: usize, refs: &[PrimRef]| split.sides[side].extent(refs, self.step(refs));
+        let [left, right] = [of_side(0, left), of_side(1, right)];
         let areas = self.areas;
         let area = areas.of(&extent.bounds.aabb());
         let least = (OVERLAP * self.whole).max(OVERLAP_OF_NODE * area);
@@ -233,7 +235,7 @@ impl Splitter<'_, '_, '_> {
         }
         let counts = cut.part(slots, task.count, shapes)?;
         let refs = slots.get(..counts[0] + counts[1])?;
-        Some(Split { counts, ..split_at(refs, counts[0], self.fewest(counts)) })
+        Some(self.split_at(refs, counts[0]))
     }
 
     /// The fewest leaves that two sides need.
@@ -250,12 +252,19 @@ impl Splitter<'_, '_, '_> {
         let levels = levels_to_halve(counts[0].max(counts[1]), self.limits.leaf_max);
         left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
     }
-}
 
-fn split_at(refs: &[PrimRef], left_count: usize, least: [usize; 2]) -> Split {
-    let (left, right) = refs.split_at_checked(left_count).unwrap_or((refs, &[]));
-    let counts = [left.len(), right.len()];
-    Split { counts, least, sides: [Known::around(left), Known::around(right)] }
+    /// The sides of a place between refs.
+    fn split_at(self, refs: &[PrimRef], left_count: usize) -> Split {
+        let (left, right) = refs.split_at_checked(left_count).unwrap_or((refs, &[]));
+        let counts = [left.len(), right.len()];
+        let known = |refs: &[PrimRef]| Known::of_side(refs, self.step(refs));
+        Split { counts, least: self.fewest(counts), sides: [known(left), known(right)] }
+    }
+
+    /// Of so many refs one is looked at to choose a plane.
+    pub fn step(self, refs: &[PrimRef]) -> usize {
+        self.limits.effort.step(refs.len())
+    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 mod census;
 mod gather;
 mod names;
+mod numbers;
 mod pack;
 mod refit;
 mod shapes;
@@ -12,6 +13,7 @@ mod visit;
 pub(crate) use gather::{GRAIN, Shape, Survey, box_around, geometries, geometry_table, survey};
 pub(crate) use names::Names;
 pub(crate) use names::digest;
+pub(crate) use numbers::{Numbers, Vertices};
 pub(crate) use pack::{Packer, pack_in_order};
 pub(crate) use refit::refit_leaves;
 pub(crate) use shapes::{Shapes, Source};

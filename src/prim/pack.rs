@@ -1,6 +1,7 @@
 //! Fills leaf blocks, each to the end before the next.
 
 use super::gather::{Shape, geometries};
+use super::numbers::Numbers;
 use super::visit::for_each_named_in;
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, LeafRef, SPHERES, SphereBlock, TRIANGLES, TriangleBlock,
@@ -104,11 +105,12 @@ impl<'b> Packer<'b> {
         Some(())
     }
 
-    fn push_triangle(&mut self, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
+    /// Adds a triangle.
+    pub fn push_triangle(&mut self, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
         let fill = &mut self.triangles;
         let open = fill.blocks.checked_sub(1).and_then(|b| self.triangle_blocks.get(b));
         let fits = open.is_some_and(|block| {
-            let known = |v: &[f32; 3]| usize::from(self.numbers.find(block, v).is_ok());
+            let known = |v: &[f32; 3]| usize::from(self.numbers.find(&block.vertices, v).is_ok());
             !fill.closed
                 && (block.count as usize) < TRIANGLES
                 && (fill.vertices + 3 <= TRIANGLES
@@ -126,7 +128,7 @@ impl<'b> Packer<'b> {
         let block = self.triangle_blocks.get_mut(number)?;
         let lane = block.count;
         for (k, corner) in corners.iter().enumerate() {
-            let v = self.numbers.number(block, corner, &mut fill.vertices);
+            let v = self.numbers.number(&mut block.vertices, corner, &mut fill.vertices);
             block.set_corner(lane as usize, k, v);
         }
         block.aabb.add(&Shape::Triangle(corners).aabb());
@@ -162,72 +164,6 @@ fn ball_around(aabb: &Aabb) -> ([f32; 3], f32) {
     let centre = ((lower + upper) / 2.0).to_array().map(|x| x as f32);
     let reach = sum_abs((upper - wide(centre)).max(wide(centre) - lower));
     (centre, f32_above(reach))
-}
-
-/// The numbers of the open block's vertices by their bits: a hash table, since a block that was
-/// written a moment ago is slow to search with vectors. Large enough that two vertices rarely want one place.
-#[derive(Clone, Copy)]
-struct Numbers([u8; 256]);
-
-impl Numbers {
-    const NONE: Numbers = Numbers([u8::MAX; 256]);
-
-    /// The number of a vertex among those of `block`, or the free place of the table for it.
-    #[cfg_attr(target_os = "none", inline(never))]
-    #[cfg_attr(not(target_os = "none"), inline)]
-    fn find(&self, block: &TriangleBlock, vertex: &[f32; 3]) -> Result<usize, usize> {
-        let mut place = place_of(vertex);
-        // At most 16 places are taken.
-        loop {
-            let v = self.0[place % 256] as usize;
-            if v >= TRIANGLES {
-                return Err(place % 256);
-            }
-            if holds(block, v, vertex) {
-                return Ok(v);
-            }
-            place += 1;
-        }
-    }
-
-    /// The number of a vertex, which becomes the next of `count` unless `block` has it. There is no branch on that, since
-    /// nobody could guess it.
-    #[inline]
-    fn number(&mut self, block: &mut TriangleBlock, vertex: &[f32; 3], count: &mut usize) -> usize {
-        let mut place = place_of(vertex);
-        let v = usize::from(self.0[place]);
-        let known = (v < TRIANGLES) & holds(block, v, vertex);
-        if v < TRIANGLES && !known {
-            match self.find(block, vertex) {
-                Ok(v) => return v,
-                Err(free) => place = free,
-            }
-        }
-        let v = if known { v } else { *count } % TRIANGLES;
-        self.0[place] = v as u8;
-        for (axis, x) in block.vertices.iter_mut().zip(vertex) {
-            axis[v] = *x;
-        }
-        *count += usize::from(!known);
-        v
-    }
-}
-
-/// Whether vertex `v` of `block` has just these bits.
-#[inline]
-fn holds(block: &TriangleBlock, v: usize, vertex: &[f32; 3]) -> bool {
-    let [x, y, z] = vertex.map(f32::to_bits);
-    let [a, b, c] = [0, 1, 2].map(|k| block.vertices[k][v % TRIANGLES].to_bits());
-    (a ^ x) | (b ^ y) | (c ^ z) == 0
-}
-
-/// The place of the table at which to look for a vertex first.
-#[inline]
-fn place_of(vertex: &[f32; 3]) -> usize {
-    let [x, y, z] = vertex.map(f32::to_bits);
-    let hash =
-        x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77) ^ z.wrapping_mul(0xC2B2_AE3D);
-    (hash >> 24) as usize
 }
 
 #[cfg(test)]

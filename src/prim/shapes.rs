@@ -65,21 +65,23 @@ impl<'s, 'a> Shapes<'s, 'a> {
     /// The shape with flat number `id`, whether it can be hit or not.
     #[inline]
     pub fn get(&mut self, id: u32) -> Option<Shape> {
-        if let Some((first, mesh)) = &self.mesh
-            && let Some(triangle) =
-                id.checked_sub(*first).and_then(|i| self.triangle(*first, mesh, i))
-        {
-            return Some(triangle);
-        }
-        self.find(id)
+        self.corners(id).map(Shape::Triangle).or_else(|| self.find(id))
     }
 
-    #[inline]
-    fn triangle(&self, first: u32, mesh: &Mesh, i: u32) -> Option<Shape> {
+    /// The corners of a triangle of the last one's mesh: they are not read from a [`Shape`], which would lie in memory.
+    #[inline(always)]
+    pub fn corners(&self, id: u32) -> Option<[[f32; 3]; 3]> {
+        let (first, mesh) = self.mesh.as_ref()?;
+        self.triangle(*first, mesh, id.checked_sub(*first)?)
+    }
+
+    #[inline(always)]
+    fn triangle(&self, first: u32, mesh: &Mesh, i: u32) -> Option<[[f32; 3]; 3]> {
         if REFIT && self.source.named {
-            return mesh.names(first, i as usize).map(Shape::Triangle);
+            mesh.names(first, i as usize)
+        } else {
+            mesh.triangle(i as usize)
         }
-        mesh.triangle(i as usize).map(Shape::Triangle)
     }
 
     #[cold]
@@ -93,7 +95,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
         let prim = id - first;
         self.mesh = scene.mesh(number).map(|mesh| (first, mesh));
         match number.checked_sub(scene.mesh_count()) {
-            None => self.triangle(first, &scene.mesh(number)?, prim),
+            None => self.triangle(first, &scene.mesh(number)?, prim).map(Shape::Triangle),
             Some(_) if !SPHERES => None,
             Some(set) => scene.sphere_set(set)?.sphere(prim as usize).map(sphere),
         }
