@@ -1,5 +1,7 @@
 //! Scenes that move: what a frame costs by refitting and by building anew, and what rays cost after it.
 
+use std::mem::MaybeUninit;
+
 use anyhow::{Context, Result, ensure};
 use raykern::{
     Accel, BuildError, BuildOptions, GridKind, GridOptions, Hit, Layout, OwnedAccel, Quality, Ray,
@@ -116,6 +118,10 @@ fn ours(still: &Model) -> Result<Vec<(String, Box<dyn Follower>)>> {
         ("ours grid", OwnedAccel::grid, with(Quality::Fast, GridKind::Nested)),
         ("ours grid, uniform", OwnedAccel::grid, with(Quality::Fast, GridKind::Uniform)),
     ];
+    for (name, kind) in [("nested", GridKind::Nested), ("uniform", GridKind::Uniform)] {
+        let again = Again::new(still, with(Quality::Fast, kind))?;
+        followers.push((format!("ours grid, {name}, in place"), Box::new(again)));
+    }
     let anew = anew.map(|(name, build, options)| (name.to_string(), Anew { build, options }));
     followers.extend(anew.map(|(name, anew)| (name, Box::new(anew) as Box<dyn Follower>)));
     Ok(followers)
@@ -147,6 +153,33 @@ impl Follower for Anew {
         let built = model.with_scene(|scene| watch.time(|| (self.build)(scene, &self.options)));
         let update = watch.take().seconds;
         [update, trace(&built.expect("a structure").accel(), rays, hits)]
+    }
+}
+
+/// A grid that is built anew in the same memory, which is what it wants for a still scene and a quarter more.
+struct Again {
+    memory: Vec<MaybeUninit<u8>>,
+    options: BuildOptions<'static>,
+}
+
+impl Again {
+    fn new(still: &Model, options: BuildOptions<'static>) -> Result<Self> {
+        let needs = still.with_scene(|scene| raykern::grid_needs(scene, &options))?;
+        let size = needs.size / 4 * 5 + needs.alignment;
+        Ok(Again { memory: vec![MaybeUninit::new(0); size], options })
+    }
+}
+
+impl Follower for Again {
+    fn follow(&mut self, model: &Model, rays: &[Ray], hits: &mut [Hit]) -> [f64; 2] {
+        let Again { memory, options } = self;
+        let start = memory.as_ptr().align_offset(64);
+        let mut watch = Watch::new();
+        model.with_scene(|scene| {
+            let built = watch.time(|| raykern::build_grid(scene, options, &mut memory[start..]));
+            let update = watch.take().seconds;
+            [update, trace(&built.expect("enough memory"), rays, hits)]
+        })
     }
 }
 

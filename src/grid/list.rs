@@ -1,5 +1,7 @@
 //! Lists that grow in memory of a given size, at one place or at several at once.
 
+use core::mem::take;
+
 /// A list that grows in memory of a given size.
 ///
 /// Its elements are numbered from `first` on: one that grows in the free room of another numbers them as that one would if it
@@ -99,4 +101,11 @@ impl<'b, T: Copy> List<'b, T> {
         self.len += piece.len;
         fall as u32
     }
+}
+
+/// Takes the first elements off a slice.
+pub(crate) fn front<'b, T>(slice: &mut &'b mut [T], count: usize) -> Option<&'b mut [T]> {
+    let (front, rest) = take(slice).split_at_mut_checked(count)?;
+    *slice = rest;
+    Some(front)
 }

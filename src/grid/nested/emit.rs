@@ -10,10 +10,10 @@ use crate::block::cells::Run;
 use crate::block::leaf::TriangleBlock;
 use crate::block::{Census, Counts, Geometry, KIND_GRID, LAYOUT_COMPACT, PartsMut};
 use crate::caller::{Caller, PARTS};
+use crate::grid::list::front;
 use crate::prim::{Source, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage::{ALIGNMENT, view, view_mut};
-use core::mem::take;
 
 /// Packs what the cells list, each cell's after the one before it, so that a cell's are in few blocks; returns the size of the
 /// block, or `None` when it does not fit, or when the caller wants no more.
@@ -163,13 +163,6 @@ impl Packing<'_> {
             Some(Packed { words: part.words.len(), triangle_blocks_at, runs_at, used: part.used })
         }))
     }
-}
-
-/// Takes the first elements off a slice.
-fn front<'b, T>(slice: &mut &'b mut [T], count: usize) -> Option<&'b mut [T]> {
-    let (front, rest) = take(slice).split_at_mut_checked(count)?;
-    *slice = rest;
-    Some(front)
 }
 
 /// Moves the triangle blocks of the parts together; returns how much all have.

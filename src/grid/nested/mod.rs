@@ -1,6 +1,7 @@
 //! Nested grids: a coarse one, and finer ones in its full cells.
 //!
-//! [`grow`] divides space and lists in each cell the numbers of what comes near it; [`emit`] makes of the lists the finished block.
+//! [`grow`] divides space and lists in each cell the numbers of what comes near it: first an [`outermost`] grid, then, depth by depth, the
+//! full cells ([`levels`], [`divide`]). [`emit`] makes of the lists the finished block, some words at a time ([`pack`]).
 //! Both work in the caller's memory: the lists and words grow at its end, the block at its front.
 
 mod cost;

@@ -13,7 +13,6 @@ use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::prim::{Source, Survey, geometries};
 use crate::scene::Scene;
-use core::mem::take;
 pub(super) use plan::Plan;
 use sort::Sorter;
 
@@ -81,11 +80,4 @@ fn build_as_planned(
     let runs = runs::write(space, packed.parts_mut(bytes)?, caller)?;
     let counts = Counts { runs, ..packed };
     counts.seal(KIND_GRID, LAYOUT_COMPACT, census, bytes)
-}
-
-/// Takes the first elements off a slice.
-fn front<'b, T>(slice: &mut &'b mut [T], count: usize) -> Option<&'b mut [T]> {
-    let (front, rest) = take(slice).split_at_mut_checked(count)?;
-    *slice = rest;
-    Some(front)
 }

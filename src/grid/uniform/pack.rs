@@ -1,8 +1,8 @@
 //! Packs primitives that were sorted into leaf blocks.
 
-use super::front;
 use crate::block::leaf::{SPHERES, SphereBlock, TRIANGLES_AT_LEAST, TriangleBlock};
 use crate::caller::{Caller, PARTS};
+use crate::grid::list::front;
 use crate::prim::{GRAIN, Packer, Source};
 
 /// So many primitives begin with a block of their own, so that they are packed alike on any thread.

@@ -2,12 +2,12 @@
 //!
 //! A thread counts and fills the runs of some rows of cells, and looks for that at all blocks that come near.
 
-use super::front;
 use super::sort::counts_to_starts;
 use crate::block::PartsMut;
 use crate::block::cells::{EMPTY, LAST, Run, run_word};
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, SphereBlock, TriangleBlock, block_ref};
 use crate::caller::{Caller, PARTS};
+use crate::grid::list::front;
 use crate::grid::space::{Range, Space};
 use crate::math::Aabb;
 use crate::prim::Shape;

@@ -1,9 +1,8 @@
 //! Sorts primitives by the cell of their centre.
 
-use super::front;
 use crate::block::Census;
 use crate::caller::{Caller, PARTS};
-use crate::grid::list::List;
+use crate::grid::list::{List, front};
 use crate::grid::space::Space;
 use crate::math::Aabb;
 use crate::prim::{GRAIN, Shape, for_each_prim_in};
