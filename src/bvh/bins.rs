@@ -172,7 +172,7 @@ pub(crate) fn best_plane(
     Bins(axes): &mut Bins,
 ) -> Option<Plane> {
     let binning = Binning::new(centres, refs.len(), effort.bins);
-    let sample = refs.iter().step_by(effort.step(refs.len()));
+    let sample = refs.iter().step_by(effort.step(refs.len()).max(1));
     let first = if effort.one_axis { centres.widest() } else { 0 };
     let looked_at = if effort.one_axis { first..first + 1 } else { 0..3 };
     if !(SMALL || effort.one_axis) {

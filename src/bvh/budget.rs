@@ -6,7 +6,7 @@
 /// By induction: what is at most a leaf is one leaf, or two of different kinds; `leaf_max + 1` refs are two leaves, or
 /// four; and the floor of what is in proportion to that is superadditive.
 pub(super) fn fewest_leaves(count: usize, mixed: bool, leaf_max: usize) -> usize {
-    let two = leaf_max + 1;
+    let two = (leaf_max + 1).max(1);
     match (count, mixed) {
         (0 | 1, _) => count,
         (_, false) => (2 * count / two).max(1),

@@ -120,7 +120,7 @@ impl Extent {
     /// That of every `step`-th ref.
     pub fn of_sample(refs: &[PrimRef], step: usize) -> Extent {
         let mut extent = Extent::EMPTY;
-        for r in refs.iter().step_by(step) {
+        for r in refs.iter().step_by(step.max(1)) {
             extent.bounds.add(&r.bounds);
             extent.centres.add(&Box4::at(centre(r)));
         }

@@ -114,10 +114,12 @@ pub(crate) fn box_around([a, b, c]: [[f32; 3]; 3]) -> Aabb {
     // Of equal zeros the first stays, as in `Aabb::add`.
     let least = |x: f32, y: f32| if y < x { y } else { x };
     let most = |x: f32, y: f32| if y > x { y } else { x };
-    Aabb {
-        lower: [0, 1, 2].map(|k| least(least(a[k], b[k]), c[k])),
-        upper: [0, 1, 2].map(|k| most(most(a[k], b[k]), c[k])),
+    let mut aabb = Aabb { lower: a, upper: a };
+    for k in 0..3 {
+        aabb.lower[k] = least(least(a[k], b[k]), c[k]);
+        aabb.upper[k] = most(most(a[k], b[k]), c[k]);
     }
+    aabb
 }
 
 /// Counts the scene.

@@ -41,7 +41,7 @@ impl Numbers {
         count: &mut usize,
     ) -> usize {
         let mut place = place_of(vertex);
-        let v = usize::from(self.0[place]);
+        let v = usize::from(self.0[place % 256]);
         let known = (v < TRIANGLES) & holds(vertices, v, vertex);
         if v < TRIANGLES && !known {
             match self.find(vertices, vertex) {
@@ -50,7 +50,7 @@ impl Numbers {
             }
         }
         let v = if known { v } else { *count } % TRIANGLES;
-        self.0[place] = v as u8;
+        self.0[place % 256] = v as u8;
         for (axis, x) in vertices.iter_mut().zip(vertex) {
             axis[v] = *x;
         }
@@ -63,8 +63,8 @@ impl Numbers {
 #[inline]
 fn holds(vertices: &Vertices, v: usize, vertex: &[f32; 3]) -> bool {
     let [x, y, z] = vertex.map(f32::to_bits);
-    let [a, b, c] = [0, 1, 2].map(|k| vertices[k][v % TRIANGLES].to_bits());
-    (a ^ x) | (b ^ y) | (c ^ z) == 0
+    let ([xs, ys, zs], v) = (vertices, v % TRIANGLES);
+    (xs[v].to_bits() ^ x) | (ys[v].to_bits() ^ y) | (zs[v].to_bits() ^ z) == 0
 }
 
 /// The place of the table at which to look for a vertex first.

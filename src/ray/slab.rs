@@ -16,7 +16,7 @@ use crate::simd::{Lanes, SMALL, Scalar, Simd, Width, mul_sub};
 /// reported too. All `t` are those of the frame.
 ///
 /// A zero component of the direction is allowed: the walls are chosen by its sign bit.
-pub(crate) trait Slab {
+pub(crate) trait Slab: Copy {
     /// The part of the ray inside the box.
     fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32>;
 
@@ -41,6 +41,7 @@ pub(crate) trait WideBoxes<S: Width<N>, const N: usize> {
 ///
 /// With `r` the scaled reciprocal of a component, the distance to a wall is `wall * r - shift`, where
 /// `shift` holds `origin * r` and all that rounding may add. `docs/METHODS.md` derives the padding.
+#[derive(Clone, Copy)]
 pub(crate) struct NarrowSlab {
     pub(super) reciprocal: [f32; 4],
     pub(super) near_shift: [f32; 4],
@@ -239,6 +240,7 @@ impl<S, V: Copy> NarrowBoxes<S, V> {
 /// Boxes in `f32` for any ray: in the ray's frame, to which they are scaled unless they are ordinary.
 ///
 /// What a wall loses by that is below 2^-149 of what it is padded by. A wall that is infinite stays so.
+#[derive(Clone, Copy)]
 pub(crate) struct FrameSlab {
     narrow: NarrowSlab,
     scale: Option<f32>,
@@ -306,6 +308,7 @@ impl Slab for FrameSlab {
 /// `0 * infinity`, in the plane of a wall, loses both comparisons.
 ///
 /// Source: \[Ize13\].
+#[derive(Clone, Copy)]
 pub(crate) struct WideSlab {
     origin: DVec3,
     /// The reciprocal of the direction in the frame, from given coordinates.

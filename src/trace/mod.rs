@@ -188,8 +188,9 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             match block.header.kind {
                 KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
                 KIND_GRID if GRID => {
-                    let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
-                    grid::walk(s, &Cells { grids, words, runs, leaves }, ray, slab, query)
+                    // Copies, as this lends them to what is out of line: all others keep them in registers.
+                    let (Block { grids, words, runs, .. }, leaves, slab) = (*block, *leaves, *slab);
+                    grid::walk(s, &Cells { grids, words, runs, leaves }, ray, &slab, query)
                 }
                 _ => leaves.intersect_all(s, ray, slab, query),
             }
