@@ -109,7 +109,8 @@ pub(super) fn is_sound(corners: [[f32; 3]; 3]) -> bool {
 }
 
 /// The smallest box around a triangle.
-#[inline(always)]
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
 pub(crate) fn box_around([a, b, c]: [[f32; 3]; 3]) -> Aabb {
     // Of equal zeros the first stays, as in `Aabb::add`.
     let least = |x: f32, y: f32| if y < x { y } else { x };

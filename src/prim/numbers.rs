@@ -33,7 +33,8 @@ impl Numbers {
 
     /// The number of a vertex, which becomes the next of `count` if it is new; they are fewer than 16 then. There is no
     /// branch on that, since nobody could guess it.
-    #[inline]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline)]
     pub fn number(
         &mut self,
         vertices: &mut Vertices,
