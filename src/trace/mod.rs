@@ -185,12 +185,13 @@ pub(crate) fn trace<S: Simd, Q: Query>(
                 *prepared = Some(late.prepare());
             }
             let Some(ray) = prepared else { return false };
+            // A copy, which may be lent to what is out of line: the way through bundles keeps its own in registers.
+            let slab = &{ *slab };
             match block.header.kind {
                 KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
                 KIND_GRID if GRID => {
-                    // Copies, as this lends them to what is out of line: all others keep them in registers.
-                    let (Block { grids, words, runs, .. }, leaves, slab) = (*block, *leaves, *slab);
-                    grid::walk(s, &Cells { grids, words, runs, leaves }, ray, &slab, query)
+                    let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
+                    grid::walk(s, &Cells { grids, words, runs, leaves }, ray, slab, query)
                 }
                 _ => leaves.intersect_all(s, ray, slab, query),
             }
