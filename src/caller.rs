@@ -60,7 +60,7 @@ impl<'a> Caller<'a> {
 
     /// How many tasks run at once, at most [`PARTS`].
     pub fn worker_count(&self) -> usize {
-        self.threads.map_or(1, |threads| threads.worker_count().min(PARTS))
+        self.threads().map_or(1, |threads| threads.worker_count().min(PARTS))
     }
 
     /// A good number of parts for the threads there are, at most [`PARTS`].

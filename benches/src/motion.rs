@@ -159,6 +159,8 @@ impl Follower for Anew {
 /// A grid that is built anew in the same memory, which is what it wants for a still scene and a quarter more.
 struct Again {
     memory: Vec<MaybeUninit<u8>>,
+    /// Where the block begins, aligned as it must be.
+    start: usize,
     options: BuildOptions<'static>,
 }
 
@@ -166,17 +168,17 @@ impl Again {
     fn new(still: &Model, options: BuildOptions<'static>) -> Result<Self> {
         let needs = still.with_scene(|scene| raykern::grid_needs(scene, &options))?;
         let size = needs.size / 4 * 5 + needs.alignment;
-        Ok(Again { memory: vec![MaybeUninit::new(0); size], options })
+        let memory = vec![MaybeUninit::new(0); size];
+        Ok(Again { start: memory.as_ptr().align_offset(needs.alignment), memory, options })
     }
 }
 
 impl Follower for Again {
     fn follow(&mut self, model: &Model, rays: &[Ray], hits: &mut [Hit]) -> [f64; 2] {
-        let Again { memory, options } = self;
-        let start = memory.as_ptr().align_offset(64);
+        let Again { memory, start, options } = self;
         let mut watch = Watch::new();
         model.with_scene(|scene| {
-            let built = watch.time(|| raykern::build_grid(scene, options, &mut memory[start..]));
+            let built = watch.time(|| raykern::build_grid(scene, options, &mut memory[*start..]));
             let update = watch.take().seconds;
             [update, trace(&built.expect("enough memory"), rays, hits)]
         })

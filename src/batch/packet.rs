@@ -43,16 +43,13 @@ struct Company<'a, 'm, Q: Together<'m>, A> {
     trusted: u32,
 }
 
-impl<'a, 'm, Q: Together<'m>, A: Record<Q::Answer>> Batch<'a, 'm, Q, A> {
+impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Traces rays that are alike, 16 for each of the [groups](GROUPS) at most.
     #[inline(always)]
-    pub(super) fn trace_together<'r, S: Simd>(self, s: S, alike: Alike, room: &'r mut Room)
-    where
-        'a: 'r,
-    {
+    pub(super) fn trace_together<S: Simd>(self, s: S, alike: Alike, room: &mut Room) {
         let Room { packet, sheared } = room;
         let sound = packet.set(s, alike, self.rays);
-        let mut company = Company::<'r, 'm, Q, A> {
+        let mut company = Company {
             leaves: Leaves::of(self.block),
             packet,
             met: [0; GROUPS],

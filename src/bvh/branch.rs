@@ -301,6 +301,7 @@ mod tests {
     use crate::bvh::budget::leaf_budget;
     use crate::bvh::tree::Depth;
     use crate::bvh::tree::tests::series;
+    use raykern_harness::make::Random;
     use std::vec::Vec;
 
     #[test]
@@ -341,14 +342,10 @@ mod tests {
 
     #[test]
     fn boxes_are_those_of_what_is_below() {
-        let mut state = 3u32;
-        let mut next = || {
-            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
-            (state >> 16) as f32 / 65536.0
-        };
+        let mut random = Random::new(3);
         let mut refs: Vec<_> = (0..20_000)
             .map(|id| {
-                let lower = [next(), next(), next()];
+                let lower = random.point(0.0, 1.0).map(|x| x as f32);
                 PrimRef::new(id, &Aabb { lower, upper: lower.map(|x| x + 0.01) }, false)
             })
             .collect();

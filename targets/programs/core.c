@@ -1,19 +1,10 @@
 // The core set of the C tests, without a C library: builds in static memory, queries, and what is refused.
 
 #include "board.h"
+#include "check.h"
 #include "raykern.h"
 #include "stack.h"
 #include "text.h"
-
-#define CHECK(condition)                      \
-    do {                                      \
-        if (!(condition)) {                   \
-            board_print("not so, line ");     \
-            print_number(__LINE__);           \
-            board_print(": " #condition "\n"); \
-            board_exit(1);                    \
-        }                                     \
-    } while (0)
 
 // Two squares across z, of two triangles each, the second one twice as far, and a single triangle behind them.
 static const float vertices[] = {0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1, 0, 0, 2, 1, 0, 2, 0, 1, 2, 1, 1, 2, 0, 0, 3, 1, 0, 3, 0, 1, 3};

@@ -1,19 +1,10 @@
 // Spheres, and instances of them, built and asked without a C library; and the stack that each takes.
 
 #include "board.h"
+#include "check.h"
 #include "raykern.h"
 #include "stack.h"
 #include "text.h"
-
-#define CHECK(condition)                      \
-    do {                                      \
-        if (!(condition)) {                   \
-            board_print("not so, line ");     \
-            print_number(__LINE__);           \
-            board_print(": " #condition "\n"); \
-            board_exit(1);                    \
-        }                                     \
-    } while (0)
 
 // Two that touch where x is 1, one in the first, and 20 small ones in a row behind them.
 static float spheres[23][4] = {{0, 0, 4, 1}, {2, 0, 4, 1}, {0, 0, 4, 0.5f}};
