@@ -361,4 +361,25 @@ pub(super) mod tests {
         }
         assert!(deepest > 55, "the series is no test: {deepest}");
     }
+
+    #[test]
+    fn a_wall_is_not_alike_to_chairs() {
+        let of = |boxes: &[([f32; 3], f32)]| {
+            let mut around = Aabb::EMPTY;
+            let refs: std::vec::Vec<_> = (boxes.iter())
+                .map(|(lower, edge)| {
+                    let aabb = Aabb { lower: *lower, upper: lower.map(|x| x + edge) };
+                    around.add(&aabb);
+                    PrimRef::new(0, &aabb, false)
+                })
+                .collect();
+            let areas = Areas::new(&Aabb { lower: [0.0; 3], upper: [1.0; 3] });
+            are_alike(&refs, areas.of(&around), areas)
+        };
+        let chair = |x: f32| ([x, 0.0, 0.0], 0.125);
+        assert!(of(&[chair(0.0), chair(0.125), chair(0.25)]), "side by side");
+        assert!(!of(&[chair(0.0), chair(0.125), ([0.0; 3], 0.5)]), "with a wall");
+        assert!(!of(&[chair(0.0), chair(0.75)]), "far apart");
+        assert!(of(&[([0.5; 3], 0.0); 4]), "all in one point");
+    }
 }
