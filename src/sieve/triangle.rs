@@ -239,19 +239,19 @@ impl One {
     }
 }
 
-/// The corners of a triangle in the sheared space.
+/// A vertex in the sheared space.
+type Sheared = (Along<[f32; 1]>, Across<[f32; 1]>);
+
+/// The corners of a triangle there.
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) fn all_sheared(
-    ray: &PreparedRay,
-    [a, b, c]: &[[f32; 3]; 3],
-) -> [(Along<[f32; 1]>, Across<[f32; 1]>); 3] {
+pub(super) fn all_sheared(ray: &PreparedRay, [a, b, c]: &[[f32; 3]; 3]) -> [Sheared; 3] {
     [sheared(ray, a), sheared(ray, b), sheared(ray, c)]
 }
 
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline(always))]
-pub(super) fn sheared(ray: &PreparedRay, vertex: &[f32; 3]) -> (Along<[f32; 1]>, Across<[f32; 1]>) {
+fn sheared(ray: &PreparedRay, vertex: &[f32; 3]) -> Sheared {
     let vertex = vertex.map(|x| [x]);
     let along = Along::new(Scalar, ray, &vertex);
     (along, Across::new::<Scalar, false, 1>(Scalar, ray, &vertex, &along))
