@@ -39,7 +39,7 @@ pub(crate) struct Spot {
 impl Spot {
     /// Where the line meets a triangle.
     pub fn on_triangle(line: &Line, corners: [[f32; 3]; 3]) -> Self {
-        let [u, v] = triangle::weights(line, corners);
+        let [u, v] = triangle::weights(line, &corners);
         let [a, b, c] = corners.map(wide);
         // Whatever the error of the weights, the point lies in the plane.
         let point = a + u * (b - a) + v * (c - a);

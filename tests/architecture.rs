@@ -86,7 +86,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         "capi",
         &[
             "accel", "build", "caller", "closest", "error", "grid", "hits", "kinds", "query",
-            "ray", "refit", "scene", "storage", "surface",
+            "ray", "refit", "scene", "simd", "storage", "surface",
         ],
     ),
 ];

@@ -10,7 +10,7 @@ use crate::block::level::Level;
 use crate::closest::{self, PointHit};
 use crate::error::OpenError;
 use crate::hits::{self, HitKey, Hits};
-use crate::levels::{self, Shown};
+use crate::levels::{self, Across, Shown};
 use crate::query::{Choice, Counts, Exact, Precision, QueryOptions, Watch, Watertight};
 use crate::ray::{Hit, NONE, Ray};
 use crate::scene::Instance;
@@ -128,48 +128,34 @@ impl<'m> Accel<'m> {
     /// and `t` is the nearest float to the real one, for all finite inputs.
     #[inline]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        if self.0.has_level() {
-            return self.intersect_levels(ray);
-        }
-        trace::closest_hit::<Exact, _>(self.0, ray, Choice::EVERYTHING, ())
+        self.either::<Exact>(ray, false)
     }
 
     /// Whether anything is hit: true exactly when [`intersect`](Self::intersect) finds a hit.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        if self.0.has_level() {
-            return self.occluded_levels(ray);
-        }
-        trace::any_hit::<Exact, _>(self.0, ray, Choice::EVERYTHING, ())
+        self.either::<Exact>(ray, true).is_some()
     }
 
     /// [`intersect_with`](Self::intersect_with) in [`Precision::Watertight`], and nothing left out: for programs with no room for the code of the
     /// exact answer, which this does not name.
     pub fn intersect_watertight(&self, ray: &Ray) -> Option<Hit> {
-        if self.0.has_level() {
-            let options = QueryOptions { precision: Precision::Watertight, ..Default::default() };
-            return levels::closest::<Watertight, _>(self.0, ray, &options, ());
-        }
-        trace::closest_hit::<Watertight, _>(self.0, ray, Choice::EVERYTHING, ())
+        self.either::<Watertight>(ray, false)
     }
 
     /// Whether anything is hit: true exactly when [`intersect_watertight`](Self::intersect_watertight) finds a hit.
     pub fn occluded_watertight(&self, ray: &Ray) -> bool {
-        if self.0.has_level() {
-            let options = QueryOptions { precision: Precision::Watertight, ..Default::default() };
-            return levels::any::<Watertight, _>(self.0, ray, &options, ());
-        }
-        trace::any_hit::<Watertight, _>(self.0, ray, Choice::EVERYTHING, ())
+        self.either::<Watertight>(ray, true).is_some()
     }
 
     /// The closest hit among what `options` leaves.
     pub fn intersect_with(&self, ray: &Ray, options: &QueryOptions) -> Option<Hit> {
-        self.intersect_watched(ray, options, ())
+        self.either_with(ray, options, (), false)
     }
 
     /// Whether anything that `options` leaves is hit.
     pub fn occluded_with(&self, ray: &Ray, options: &QueryOptions) -> bool {
-        self.occluded_watched(ray, options, ())
+        self.either_with(ray, options, (), true).is_some()
     }
 
     /// [`intersect`](Self::intersect) for each ray; a miss is written as [`Hit::MISS`]. Stops at the
@@ -237,48 +223,37 @@ impl<'m> Accel<'m> {
         options: &QueryOptions,
         counts: &mut Counts,
     ) -> Option<Hit> {
-        self.intersect_watched(ray, options, counts)
+        self.either_with(ray, options, counts, false)
     }
 
     /// [`occluded_with`](Self::occluded_with) that adds what it did to `counts`.
     pub fn occluded_counted(&self, ray: &Ray, options: &QueryOptions, counts: &mut Counts) -> bool {
-        self.occluded_watched(ray, options, counts)
+        self.either_with(ray, options, counts, true).is_some()
     }
 
+    /// The closest hit among what `options` leave or, with `any`, something if anything of it is hit.
     #[inline(always)]
-    fn intersect_watched(
+    pub(crate) fn either_with(
         &self,
         ray: &Ray,
         options: &QueryOptions,
         watch: impl Watch,
+        any: bool,
     ) -> Option<Hit> {
-        let (block, choice) = (self.0, self.choice(options));
-        if block.has_level() {
-            return match options.precision {
-                Precision::Exact => levels::closest::<Exact, _>(block, ray, options, watch),
-                Precision::Watertight => {
-                    levels::closest::<Watertight, _>(block, ray, options, watch)
-                }
-            };
-        }
+        let block = self.0;
         match options.precision {
-            Precision::Exact => trace::closest_hit::<Exact, _>(block, ray, choice, watch),
-            Precision::Watertight => trace::closest_hit::<Watertight, _>(block, ray, choice, watch),
-        }
-    }
-
-    #[inline(always)]
-    fn occluded_watched(&self, ray: &Ray, options: &QueryOptions, watch: impl Watch) -> bool {
-        let (block, choice) = (self.0, self.choice(options));
-        if block.has_level() {
-            return match options.precision {
-                Precision::Exact => levels::any::<Exact, _>(block, ray, options, watch),
-                Precision::Watertight => levels::any::<Watertight, _>(block, ray, options, watch),
-            };
-        }
-        match options.precision {
-            Precision::Exact => trace::any_hit::<Exact, _>(block, ray, choice, watch),
-            Precision::Watertight => trace::any_hit::<Watertight, _>(block, ray, choice, watch),
+            Precision::Exact if block.has_level() => {
+                in_levels::<Exact>(block, ray, options, watch, any)
+            }
+            Precision::Watertight if block.has_level() => {
+                in_levels::<Watertight>(block, ray, options, watch, any)
+            }
+            Precision::Exact => {
+                trace::either_hit::<Exact, _>(block, ray, self.choice(options), watch, any)
+            }
+            Precision::Watertight => {
+                trace::either_hit::<Watertight, _>(block, ray, self.choice(options), watch, any)
+            }
         }
     }
 
@@ -351,22 +326,39 @@ impl<'m> Accel<'m> {
         Some(spot.mapped(&instance.map()).surface())
     }
 
+    /// The closest hit or, with `any`, something if anything is hit; nothing is left out.
+    #[inline(always)]
+    pub(crate) fn either<D: Across>(&self, ray: &Ray, any: bool) -> Option<Hit> {
+        if self.0.has_level() {
+            return self.either_in_levels::<D>(ray, any);
+        }
+        trace::either_hit::<D, _>(self.0, ray, Choice::EVERYTHING, (), any)
+    }
+
     /// Out of line, so that calls for blocks without instances stay short.
     #[cold]
     #[inline(never)]
-    fn intersect_levels(&self, ray: &Ray) -> Option<Hit> {
-        self.intersect_with(ray, &QueryOptions::default())
-    }
-
-    /// Likewise.
-    #[cold]
-    #[inline(never)]
-    fn occluded_levels(&self, ray: &Ray) -> bool {
-        self.occluded_with(ray, &QueryOptions::default())
+    fn either_in_levels<D: Across>(&self, ray: &Ray, any: bool) -> Option<Hit> {
+        in_levels::<D>(self.0, ray, &QueryOptions::default(), (), any)
     }
 
     #[inline(always)]
     fn choice(&self, options: &QueryOptions) -> Choice {
         Shown::own(self.0).choice(options)
+    }
+}
+
+/// The closest or any hit of a block with instances.
+#[inline(always)]
+fn in_levels<D: Across>(
+    block: Finished,
+    ray: &Ray,
+    options: &QueryOptions,
+    watch: impl Watch,
+    any: bool,
+) -> Option<Hit> {
+    match any {
+        true => levels::any::<D, _>(block, ray, options, watch).then_some(Hit::MISS),
+        false => levels::closest::<D, _>(block, ray, options, watch),
     }
 }

@@ -7,6 +7,7 @@ use crate::prim::{self, Leaves};
 use crate::{bvh, grid};
 
 /// Whether what is not in instances can be traversed.
+#[inline]
 pub(super) fn block_is_sound(block: &Block) -> bool {
     let Block { header, geometries, grids, nodes, bundles, words, runs, .. } = *block;
     let leaves = Leaves::of(block);

@@ -53,7 +53,8 @@ impl TriangleBlock {
     };
 
     /// The vertices of triangle `i < 16`, whatever the block holds.
-    #[inline(always)]
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
     pub fn triangle(&self, i: usize) -> [[f32; 3]; 3] {
         let [x, y, z] = &self.vertices;
         let [a, b, c] = self.corner_numbers(i);

@@ -41,6 +41,12 @@ impl BvhNode {
         LeafRef { block: self.first, lanes: self.lanes }
     }
 
+    /// The lower and the upper corner of the box.
+    #[inline(always)]
+    pub fn corners(&self) -> [&[f32; 3]; 2] {
+        [&self.lower, &self.upper]
+    }
+
     pub fn aabb(&self) -> Aabb {
         Aabb { lower: self.lower, upper: self.upper }
     }

@@ -168,7 +168,7 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
         return Err(OpenError::Misaligned);
     }
     let Some(header) = storage::view::<Header>(bytes, 0, 1).and_then(<[_]>::first) else {
-        let begins_right = bytes.iter().zip(MAGIC).all(|(byte, letter)| *byte == letter);
+        let begins_right = bytes.iter().zip(&MAGIC).all(|(byte, letter)| byte == letter);
         return Err(if begins_right { OpenError::Truncated } else { OpenError::NotABlock });
     };
     // As numbers: else it would be a call.
@@ -184,7 +184,7 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
     if header.version != VERSION {
         return Err(OpenError::Version);
     }
-    if !matches!(header.layout, LAYOUT_COMPACT | 4 | 8 | 16) || !is_known(header) {
+    if !is_known(header) {
         return Err(OpenError::Layout);
     }
     let counts = &header.counts;
@@ -197,9 +197,10 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
 }
 
 /// Whether this build of the library reads what is in a block.
+#[inline]
 fn is_known(header: &Header) -> bool {
     let Counts { grids, words, runs, bundle_lanes, sphere_blocks, .. } = header.counts;
-    (WIDE || header.layout == LAYOUT_COMPACT)
+    (header.layout == LAYOUT_COMPACT || WIDE && matches!(header.layout, 4 | 8 | 16))
         && (GRID || header.kind != KIND_GRID)
         && (GRID || grids | words | runs == 0)
         && (WIDE || bundle_lanes == 0)

@@ -37,19 +37,6 @@ impl<E: Copy> Pending<E> {
     }
 }
 
-impl Pending<(u32, f32)> {
-    /// The last node pushed that the ray enters before `t_bound`, of those pushed with the `t` at which it does.
-    #[inline(always)]
-    pub fn pop_within(&mut self, t_bound: f32) -> Option<u32> {
-        loop {
-            let (node, near) = self.pop()?;
-            if near <= t_bound {
-                return Some(node);
-            }
-        }
-    }
-}
-
 /// Room for a [`Stack`].
 pub(crate) struct Columns<const ROOM: usize> {
     near: [MaybeUninit<f32>; ROOM],

@@ -5,7 +5,17 @@ use crate::block::BvhNode;
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
 use crate::ray::{PreparedRay, Slab};
-use crate::simd::Simd;
+use crate::simd::{SMALL, Simd};
+
+/// A node to come back to, and the `t` at which the ray enters it. Where room is scarce that is computed again: it takes half
+/// the stack, and three hundredths more instructions.
+#[derive(Clone, Copy)]
+struct Waiting {
+    node: u32,
+    near: [f32; KEPT],
+}
+
+const KEPT: usize = if SMALL { 0 } else { 1 };
 
 /// Offers `query` everything the ray meets, near nodes first; true when it ended the search.
 ///
@@ -23,7 +33,7 @@ pub(crate) fn traverse<S: Simd, Q: Query>(
     let mut stack = Pending::new();
     let Some(mut node) = nodes.first() else { return false };
     query.watch().step();
-    if slab.part(&node.aabb(), query.t_bound()).is_empty() {
+    if slab.part(node.corners(), query.t_bound()).is_empty() {
         return false;
     }
     loop {
@@ -35,11 +45,18 @@ pub(crate) fn traverse<S: Simd, Q: Query>(
             node = child;
             continue;
         }
-        let Some(next) = stack.pop_within(query.t_bound()).and_then(|i| nodes.get(i as usize))
-        else {
-            return false;
+        // What was met meanwhile may be nearer than what waits.
+        node = loop {
+            let Some(waiting) = stack.pop() else { return false };
+            let Some(next) = nodes.get(waiting.node as usize) else { return false };
+            let is_within = match waiting.near.first() {
+                Some(near) => *near <= query.t_bound(),
+                None => !slab.part(next.corners(), query.t_bound()).is_empty(),
+            };
+            if is_within {
+                break next;
+            }
         };
-        node = next;
     }
 }
 
@@ -50,23 +67,23 @@ fn nearer_child<'n, Q: Query>(
     first: u32,
     slab: &impl Slab,
     query: &mut Q,
-    stack: &mut Pending<(u32, f32)>,
+    stack: &mut Pending<Waiting>,
 ) -> Option<&'n BvhNode> {
     let [left, right] = nodes.get(first as usize..)?.first_chunk::<2>()?;
     query.watch().step();
     query.watch().step();
     let t_bound = query.t_bound();
-    let (a, b) = (slab.part(&left.aabb(), t_bound), slab.part(&right.aabb(), t_bound));
+    let (a, b) = (slab.part(left.corners(), t_bound), slab.part(right.corners(), t_bound));
     match (a.is_empty(), b.is_empty()) {
         (true, true) => None,
         (false, true) => Some(left),
         (true, false) => Some(right),
         (false, false) if a.near <= b.near => {
-            stack.push((first + 1, b.near));
+            stack.push(Waiting { node: first + 1, near: [b.near; KEPT] });
             Some(left)
         }
         (false, false) => {
-            stack.push((first, a.near));
+            stack.push(Waiting { node: first, near: [a.near; KEPT] });
             Some(right)
         }
     }

@@ -16,18 +16,29 @@
 //! The registers are changed by inline assembly, because the intrinsics for it are deprecated, and
 //! the work between is a function that is never inlined, so that no float operation moves across.
 
+use crate::simd::SMALL;
+
 #[cfg(all(target_arch = "x86", not(target_feature = "sse2")))]
 compile_error!("the x87 rounds in extended precision: compile for x86 with SSE2");
 
-/// Runs `work` under the default floating-point state.
+/// Runs `work` under the default floating-point state. Where code shall be small, `work` is there once for both cases.
 #[inline(always)]
 pub(crate) fn with_default<R>(work: impl FnOnce() -> R) -> R {
     let state = State::read();
-    if state.is_default() { work() } else { set_aside(state, work) }
+    match state.is_default() {
+        _ if SMALL => set_aside(state, work),
+        true => work(),
+        false => rarely(state, work),
+    }
 }
 
 #[cold]
 #[inline(never)]
+fn rarely<R>(state: State, work: impl FnOnce() -> R) -> R {
+    set_aside(state, work)
+}
+
+#[inline(always)]
 fn set_aside<R>(state: State, work: impl FnOnce() -> R) -> R {
     #[inline(never)]
     fn apart<R>(work: impl FnOnce() -> R) -> R {
@@ -40,8 +51,10 @@ fn set_aside<R>(state: State, work: impl FnOnce() -> R) -> R {
             self.0.write();
         }
     }
-    let _restore = Restore(state);
-    State::DEFAULT.write();
+    let _restore = (!state.is_default()).then(|| {
+        State::DEFAULT.write();
+        Restore(state)
+    });
     apart(work)
 }
 

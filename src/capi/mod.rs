@@ -23,6 +23,7 @@ use status::{Error, RT_OK, RtStatus};
 use types::RtAccel;
 
 /// Runs an entry point that returns a status.
+#[inline]
 fn guard(work: impl FnOnce() -> Result<(), Error>) -> RtStatus {
     let result = control::with_default(|| stopping_panics(work));
     match result.unwrap_or(Err(Error::Internal)) {
@@ -32,8 +33,9 @@ fn guard(work: impl FnOnce() -> Result<(), Error>) -> RtStatus {
 }
 
 /// Runs an entry point that returns an answer; after a panic it is `otherwise`.
+#[inline]
 fn answer<R>(work: impl FnOnce() -> R, otherwise: R) -> R {
-    control::with_default(|| stopping_panics(work)).unwrap_or(otherwise)
+    control::with_default(move || stopping_panics(work)).unwrap_or(otherwise)
 }
 
 /// What `work` returns, or `None` when it panicked.
@@ -47,6 +49,7 @@ fn stopping_panics<R>(work: impl FnOnce() -> R) -> Option<R> {
 
 /// Without std a panic cannot be caught: it ends in the panic handler and does not come back.
 #[cfg(not(feature = "std"))]
+#[inline]
 fn stopping_panics<R>(work: impl FnOnce() -> R) -> Option<R> {
     Some(work())
 }

@@ -10,7 +10,7 @@ use super::{accel_at, answer, guard};
 use core::mem::offset_of;
 
 use crate::accel::Accel;
-use crate::query::{Facing, Precision, PrimId, QueryOptions};
+use crate::query::{Exact, Facing, Precision, PrimId, QueryOptions, Watertight};
 use crate::ray::{Hit, Ray};
 use crate::surface::Surface;
 
@@ -29,7 +29,7 @@ pub unsafe extern "C" fn rt_intersect(
     hit: *mut RtHit,
 ) -> bool {
     // SAFETY: the caller's promise.
-    unsafe { closest(accel, ray, hit, |accel, ray| Ok(accel.intersect(ray))) }
+    unsafe { exact(accel, ray, Wanted::Closest(hit)) }
 }
 
 /// Whether the ray hits anything: true exactly when `rt_intersect` is. False when a pointer is null.
@@ -40,7 +40,7 @@ pub unsafe extern "C" fn rt_intersect(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rt_occluded(accel: *const RtAccel, ray: *const RtRay) -> bool {
     // SAFETY: the caller's promise.
-    unsafe { any(accel, ray, |accel, ray| Ok(accel.occluded(ray))) }
+    unsafe { exact(accel, ray, Wanted::Any) }
 }
 
 /// `rt_intersect` with RT_PRECISION_WATERTIGHT: no code of the exact answer is linked for it.
@@ -55,7 +55,7 @@ pub unsafe extern "C" fn rt_intersect_watertight(
     hit: *mut RtHit,
 ) -> bool {
     // SAFETY: the caller's promise.
-    unsafe { closest(accel, ray, hit, |accel, ray| Ok(accel.intersect_watertight(ray))) }
+    unsafe { watertight(accel, ray, Wanted::Closest(hit)) }
 }
 
 /// `rt_occluded` with RT_PRECISION_WATERTIGHT: true exactly when `rt_intersect_watertight` is.
@@ -66,7 +66,7 @@ pub unsafe extern "C" fn rt_intersect_watertight(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn rt_occluded_watertight(accel: *const RtAccel, ray: *const RtRay) -> bool {
     // SAFETY: the caller's promise.
-    unsafe { any(accel, ray, |accel, ray| Ok(accel.occluded_watertight(ray))) }
+    unsafe { watertight(accel, ray, Wanted::Any) }
 }
 
 /// `rt_intersect` for what `query` leaves; null leaves everything. When the query is refused, for a
@@ -83,9 +83,7 @@ pub unsafe extern "C" fn rt_intersect_with(
     hit: *mut RtHit,
 ) -> bool {
     // SAFETY: the caller's promise.
-    let options = || unsafe { query_options(query) };
-    // SAFETY: the caller's promise.
-    unsafe { closest(accel, ray, hit, |accel, ray| Ok(accel.intersect_with(ray, &options()?))) }
+    unsafe { chosen(accel, ray, query, Wanted::Closest(hit)) }
 }
 
 /// `rt_occluded` for what `query` leaves; null leaves everything. False when the query is refused.
@@ -100,54 +98,100 @@ pub unsafe extern "C" fn rt_occluded_with(
     query: *const RtQuery,
 ) -> bool {
     // SAFETY: the caller's promise.
-    let options = || unsafe { query_options(query) };
-    // SAFETY: the caller's promise.
-    unsafe { any(accel, ray, |accel, ray| Ok(accel.occluded_with(ray, &options()?))) }
+    unsafe { chosen(accel, ray, query, Wanted::Any) }
 }
 
-/// The closest hit as `ask` finds it, written down.
+/// What is asked of a ray.
+#[derive(Clone, Copy)]
+enum Wanted {
+    /// The closest hit, to be written there.
+    Closest(*mut RtHit),
+    /// Whether there is any.
+    Any,
+}
+
+/// Both questions, answered exactly: one function for them where code shall be small.
+///
+/// # Safety
+///
+/// As for [`rt_intersect`].
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
+unsafe fn exact(accel: *const RtAccel, ray: *const RtRay, wanted: Wanted) -> bool {
+    // SAFETY: the caller's promise.
+    unsafe { answered(accel, ray, wanted, |accel, ray, any| Ok(accel.either::<Exact>(ray, any))) }
+}
+
+/// The same in `f32`.
+///
+/// # Safety
+///
+/// As for [`rt_intersect`].
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
+unsafe fn watertight(accel: *const RtAccel, ray: *const RtRay, wanted: Wanted) -> bool {
+    // SAFETY: the caller's promise.
+    unsafe {
+        answered(accel, ray, wanted, |accel, ray, any| Ok(accel.either::<Watertight>(ray, any)))
+    }
+}
+
+/// The same as `query` wants it.
+///
+/// # Safety
+///
+/// As for [`rt_intersect_with`].
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
+unsafe fn chosen(
+    accel: *const RtAccel,
+    ray: *const RtRay,
+    query: *const RtQuery,
+    wanted: Wanted,
+) -> bool {
+    // SAFETY: the caller's promise.
+    let options = || unsafe { query_options(query) };
+    // SAFETY: the caller's promise.
+    unsafe {
+        answered(accel, ray, wanted, |accel, ray, any| {
+            Ok(accel.either_with(ray, &options()?, (), any))
+        })
+    }
+}
+
+/// Whether `find` finds what is wanted, which is written down.
 ///
 /// # Safety
 ///
 /// As for [`rt_intersect`].
 #[inline(always)]
-unsafe fn closest(
+unsafe fn answered(
     accel: *const RtAccel,
     ray: *const RtRay,
-    hit: *mut RtHit,
-    ask: impl FnOnce(&Accel, &Ray) -> Result<Option<Hit>, Error>,
+    wanted: Wanted,
+    find: impl FnOnce(&Accel, &Ray, bool) -> Result<Option<Hit>, Error>,
 ) -> bool {
-    let ask = || -> Result<bool, Error> {
+    let ask = move || -> Result<bool, Error> {
         // SAFETY: the caller's promise.
         let accel = unsafe { accel_at(accel) }?;
         // SAFETY: the caller's promise.
-        let (ray, hit) = (unsafe { ray_at(ray) }?, pointer(hit)?);
-        let found = ask(&accel, ray)?;
-        // SAFETY: not null, aligned, and valid as the caller promises.
-        unsafe { hit.write(found.unwrap_or(Hit::MISS).into()) };
+        let ray = unsafe { ray_at(ray) }?;
+        let hit = match wanted {
+            Wanted::Closest(hit) => Some(pointer(hit)?),
+            Wanted::Any => None,
+        };
+        let found = find(&accel, ray, hit.is_none())?;
+        if let Some(hit) = hit {
+            let found = match found {
+                Some(found) => found,
+                None => Hit::MISS,
+            };
+            // SAFETY: not null, aligned, and valid as the caller promises.
+            unsafe { hit.write(found.into()) };
+        }
         Ok(found.is_some())
     };
-    answer(|| ask().unwrap_or(false), false)
-}
-
-/// Whether `ask` finds any hit.
-///
-/// # Safety
-///
-/// As for [`rt_occluded`].
-#[inline(always)]
-unsafe fn any(
-    accel: *const RtAccel,
-    ray: *const RtRay,
-    ask: impl FnOnce(&Accel, &Ray) -> Result<bool, Error>,
-) -> bool {
-    let ask = || -> Result<bool, Error> {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        ask(&accel, unsafe { ray_at(ray) }?)
-    };
-    answer(|| ask().unwrap_or(false), false)
+    answer(move || ask().unwrap_or(false), false)
 }
 
 /// Why a query with these options would be refused, or RT_OK. Null is the default query.

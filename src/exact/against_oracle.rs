@@ -97,6 +97,13 @@ impl Compact {
         }
     }
 
+    fn compare_with_float(&self, x: Binary) -> Ordering {
+        match self {
+            Compact::Quotient(t) => t.compare_with_float(x),
+            Compact::Root(t) => t.compare_with_float(x),
+        }
+    }
+
     fn compare(&self, other: &Compact) -> Ordering {
         match (self, other) {
             (Compact::Quotient(p), Compact::Quotient(q)) => p.compare(q),
@@ -116,9 +123,13 @@ fn judge_compact(lines: &[Line], meetings: &[Meeting], limits: &[f32], seed: &st
         assert_eq!(ours.is_some(), real.is_some(), "{}", place());
         let Some((ours, real)) = ours.zip(real) else { continue };
         for limit in limits {
-            let float = Compact::Quotient(compact::Quotient::float(Binary::of(*limit)));
             let order = real.cmp(&RealRoot::float(*limit));
-            assert_eq!(ours.compare(&float), order, "limit {limit:e}, {}", place());
+            assert_eq!(
+                ours.compare_with_float(Binary::of(*limit)),
+                order,
+                "limit {limit:e}, {}",
+                place()
+            );
         }
         judge_size(ours.approximate(), &real, &place());
         for (other, other_real) in &met {
@@ -173,7 +184,7 @@ fn judge_triangle(line: &Line, triangle: Triangle, seed: &str) {
     let (o, d) = (vector(line.origin), vector(line.direction));
     let [a, b, c] = triangle.map(|p| difference(&vector(p), &o));
     let real = [(&c, &a), (&a, &b), (&b, &c)].map(|(p, q)| dot(&d, &cross(p, q)));
-    let [short, long] = [compact::volumes(line, triangle), volumes(line, triangle)];
+    let [short, long] = [compact::volumes(line, &triangle), volumes(line, &triangle)];
     for (ours, real) in long.into_iter().chain(short).zip(real.iter().cycle()) {
         let ours = Dyadic::from_f64(ours);
         assert_eq!(ours.sign(), real.sign(), "{seed}: {line:?} {triangle:?}");

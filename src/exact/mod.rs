@@ -28,7 +28,7 @@ use core::cmp::Ordering;
 #[cfg(not(target_pointer_width = "64"))]
 use compact::{Quotient, Root};
 #[cfg(not(target_pointer_width = "64"))]
-pub(crate) use compact::{has_area, normal, volumes};
+pub(crate) use compact::{has_area, is_within, normal, order, to_plane, volumes};
 pub(crate) use sphere::{Roots, from_centre};
 #[cfg(target_pointer_width = "64")]
 pub(crate) use triangle::{has_area, normal, volumes};
@@ -122,19 +122,21 @@ impl Distance {
     }
 
     /// The order against a limit, which may be infinite. NaN is in no order: any answer.
+    #[cfg(test)]
     pub fn compare_with(&self, limit: f32) -> Ordering {
-        if limit.is_infinite() {
-            return 0.0.partial_cmp(&limit).unwrap_or(Ordering::Equal);
-        }
-        self.compare_with_binary(Binary::of(limit))
+        order_with(limit, |x| self.compare_with_binary(x))
+    }
+
+    /// Whether it is within two limits.
+    fn is_within(&self, limits: [f32; 2]) -> bool {
+        between(limits, |limit| self.compare_with_binary(limit))
     }
 
     fn compare_with_binary(&self, x: Binary) -> Ordering {
-        let x = Quotient::float(x);
         match self {
-            Distance::Quotient(t) => t.compare(&x),
+            Distance::Quotient(t) => t.compare_with_float(x),
             Distance::Root(_) if !SPHERES => Ordering::Equal,
-            Distance::Root(t) => t.compare_with(&x),
+            Distance::Root(t) => t.compare_with_float(x),
         }
     }
 
@@ -155,4 +157,38 @@ impl Distance {
         };
         nearest + 0.0
     }
+}
+
+/// The order against a limit, which may be infinite, as `compare` says for those that are not. NaN is in no order: any answer.
+#[inline]
+fn order_with(limit: f32, compare: impl Fn(Binary) -> Ordering) -> Ordering {
+    if limit.is_infinite() {
+        return 0.0.partial_cmp(&limit).unwrap_or(Ordering::Equal);
+    }
+    compare(Binary::of(limit))
+}
+
+/// Whether what `compare` compares is within two limits.
+#[inline]
+fn between([t_min, t_max]: [f32; 2], compare: impl Fn(Binary) -> Ordering) -> bool {
+    order_with(t_min, &compare) != Ordering::Less
+        && order_with(t_max, &compare) != Ordering::Greater
+}
+
+/// The order of two meetings on one line; `None` when it does not meet both.
+#[cfg(target_pointer_width = "64")]
+pub(crate) fn order(line: &Line, one: &Meeting, other: &Meeting) -> Option<Ordering> {
+    Some(Distance::new(line, one)?.compare(&Distance::new(line, other)?))
+}
+
+/// Whether the line meets it within two limits.
+#[cfg(target_pointer_width = "64")]
+pub(crate) fn is_within(line: &Line, meeting: &Meeting, limits: [f32; 2]) -> bool {
+    Distance::new(line, meeting).is_some_and(|t| t.is_within(limits))
+}
+
+/// See [`Distance::approximate`]: of the plane of a triangle; `None` when the line is parallel to it.
+#[cfg(target_pointer_width = "64")]
+pub(crate) fn to_plane(line: &Line, triangle: &Triangle) -> Option<(f64, f64)> {
+    Some(Quotient::new(line, *triangle)?.approximate())
 }

@@ -62,7 +62,7 @@ fn measure(name: &str, number: impl Fn(&mut Random) -> f32) {
     });
     time("triangle: volumes", &triangles, |c| {
         let Meeting::Triangle(corners) = c.1 else { return };
-        black_box(volumes(&c.0, corners));
+        black_box(volumes(&c.0, &corners));
     });
     time("triangle / triangle: two new, compare", &triangles, |c| {
         let (p, q) = (Distance::new(&c.0, &c.1), Distance::new(&c.0, &c.2));

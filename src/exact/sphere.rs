@@ -9,6 +9,7 @@ use core::cmp::Ordering;
 use super::Line;
 use super::triangle::{Quotient, shifts};
 use super::units::{Unit, Units, dot, in_shortest, minus};
+use crate::math::binary::Binary;
 use crate::math::float::sqrt;
 use crate::math::integer::{Integer, Number};
 use crate::math::rounding::UNIT;
@@ -120,6 +121,11 @@ impl Root {
 
     pub fn approximate(&self) -> (f64, f64) {
         self.roots.approximate()[usize::from(self.far)]
+    }
+
+    /// The order against a float, or the middle of two.
+    pub fn compare_with_float(&self, x: Binary) -> Ordering {
+        self.compare_with(&Quotient::float(x))
     }
 
     /// The order against the distance of a plane, eighth degree, or a float, fourth degree.

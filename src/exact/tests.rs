@@ -136,7 +136,7 @@ fn foreign_bits_are_answered() {
         let mut point = || [0, 1, 2].map(|_| number(&mut random));
         let line = line(point(), point());
         let corners = [point(), point(), point()];
-        volumes(&line, corners);
+        volumes(&line, &corners);
         has_area(corners);
         let [centre, [radius, limit, _], _] = corners;
         for meeting in [0, 1, 2].map(|root| match root {

@@ -22,9 +22,9 @@ type Sixth = Integer<27>;
 /// what the triangle test computes in `f64`.
 ///
 /// Exact in sign; in size within `1.001 UNIT` of the real one.
-pub(crate) fn volumes(line: &Line, triangle: Triangle) -> [f64; 3] {
-    let units = units(line, triangle);
-    in_shortest!(units.bits(2, 1, 5), Third, volumes_in(units, line, triangle))
+pub(crate) fn volumes(line: &Line, triangle: &Triangle) -> [f64; 3] {
+    let units = units(line, *triangle);
+    in_shortest!(units.bits(2, 1, 5), Third, volumes_in(units, line, *triangle))
 }
 
 fn volumes_in<N: Number>(units: Units, line: &Line, [a, b, c]: Triangle) -> [f64; 3] {
@@ -101,6 +101,11 @@ impl Quotient {
     pub(super) fn float(Binary { mantissa, exponent }: Binary) -> Self {
         let whole = |x| Third::scaled(x, 0);
         Quotient { dividend: whole(mantissa), divisor: whole(1), exponent }
+    }
+
+    /// The order against a float, or the middle of two.
+    pub fn compare_with_float(&self, x: Binary) -> Ordering {
+        self.compare(&Self::float(x))
     }
 
     /// The quotient in `f64`, and a bound on its error.

@@ -33,7 +33,7 @@ impl Map {
         }
         let [a, b, c] = rows(&object_to_world);
         // The volume of the second pair: `a . (b x c)`.
-        let [_, determinant, _] = volumes(&Line { origin: [0.0; 3], direction: a }, [b, c, b]);
+        let [_, determinant, _] = volumes(&Line { origin: [0.0; 3], direction: a }, &[b, c, b]);
         if determinant == 0.0 {
             return None;
         }

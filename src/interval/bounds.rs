@@ -75,13 +75,13 @@ fn triangles() {
         let n = cross(&difference(&rb, &ra), &difference(&rc, &ra));
         let (dividend, divisor) = (dot(&ra, &n), dot(&d, &n));
         if divisor.sign() == 0 {
-            assert!(triangle::plane(&line, corners).is_none());
+            assert!(triangle::plane(&line, &corners).is_none());
             continue;
         }
-        let plane = triangle::plane(&line, corners).expect("not parallel");
+        let plane = triangle::plane(&line, &corners).expect("not parallel");
         // Of lines that pass between the edges the side is told, whatever the divisor's error.
-        let met = triangle::meet(&line, corners);
-        assert!(met.is_none_or(|met| met.front == (divisor.sign() < 0)));
+        let met = triangle::meet(&line, &corners);
+        assert!(met.is_none_or(|(met, _)| met.front == (divisor.sign() < 0)));
         let off = &(&Dyadic::from_f64(plane.t) * &divisor) - &dividend;
         t.see(off.ratio(&divisor), plane.t_error);
     }

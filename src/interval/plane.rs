@@ -20,10 +20,12 @@ pub(crate) struct PlaneMeeting<D> {
 }
 
 impl<D: Doubles> PlaneMeeting<D> {
+    /// Of a line from an origin along `direction` and a triangle: the way from there to its first vertex, and its edges
+    /// from that one to the others.
+    ///
     /// Source: \[MT97\] for the weights.
     #[inline(always)]
-    pub fn new(origin: Vector<D>, direction: Vector<D>, [a, b, c]: [Vector<D>; 3]) -> Self {
-        let (to_plane, e1, e2) = (minus(a, origin), minus(b, a), minus(c, a));
+    pub fn new(direction: Vector<D>, to_plane: Vector<D>, [e1, e2]: [Vector<D>; 2]) -> Self {
         let n = cross(e1, e2);
         let along = dot(direction, n);
         // Four roundings in `n`, one in `to_plane`, three in either dot product.
@@ -46,7 +48,7 @@ impl<D: Doubles> PlaneMeeting<D> {
 
 #[cfg_attr(target_pointer_width = "64", inline(always))]
 #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
-fn minus<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> Vector<D> {
+pub(crate) fn minus<D: Doubles>([ax, ay, az]: Vector<D>, [bx, by, bz]: Vector<D>) -> Vector<D> {
     [ax.sub(bx), ay.sub(by), az.sub(bz)]
 }
 

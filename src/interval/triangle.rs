@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::plane::PlaneMeeting;
-use crate::exact::{self, Distance, Line, Meeting};
+use super::plane::{self, PlaneMeeting};
+use crate::exact::{self, Line};
 use crate::math::float::SLOW_F64;
 use crate::math::rounding::{UNIT32, gamma};
 use crate::math::wide::{cross, dot, minus};
@@ -19,8 +19,6 @@ pub(crate) struct TriangleMeeting {
     pub front: bool,
     /// Whether it took real arithmetic to know.
     pub exact: bool,
-    /// Where on the triangle it is, as far as that was asked.
-    pub feature: Feature,
 }
 
 /// A part of a triangle that a line was found to pass through.
@@ -58,7 +56,7 @@ impl Feature {
     }
 }
 
-/// The meeting of the line with the closed triangle, whatever its `t`.
+/// The meeting of the line with the closed triangle, whatever its `t`, and where on it, as far as that was asked.
 ///
 /// Exact: hit or miss and the side are those of real arithmetic, for all finite inputs. `t` is within
 /// `t_error`. A line parallel to the plane misses.
@@ -70,11 +68,19 @@ impl Feature {
 /// computed again without error; or all of it at once, where `f64` takes longer than integers.
 ///
 /// Source: \[DEG12\]; the filter after \[She97\].
-pub(crate) fn meet(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    let sure = if SLOW_F64 { Some(false) } else { surely_met(line, triangle) }?;
-    let feature = if sure { Feature::Face } else { exactly_met(line, triangle)? };
+#[inline(always)]
+pub(crate) fn meet(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<(TriangleMeeting, Feature)> {
+    let (feature, exact) = passed(line, triangle)?;
     let meeting = plane(line, triangle)?;
-    Some(TriangleMeeting { exact: meeting.exact || !sure, feature, ..meeting })
+    Some((TriangleMeeting { exact: meeting.exact || exact, ..meeting }, feature))
+}
+
+/// Where on the triangle the line passes, and whether it took real arithmetic to know; `None` beside it.
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
+fn passed(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<(Feature, bool)> {
+    let sure = if SLOW_F64 { Some(false) } else { surely_met(line, *triangle) }?;
+    Some(if sure { (Feature::Face, false) } else { (exactly_met(line, triangle)?, true) })
 }
 
 /// Whether the line surely passes between the edges; `None` when it surely does not.
@@ -107,13 +113,12 @@ pub(super) fn volume_error(line: &Line, triangle: [[f32; 3]; 3]) -> f64 {
 }
 
 /// Which part of the triangle the line meets: it does when all volumes that are not zero have one sign.
-#[cfg_attr(target_os = "none", inline(never))]
-fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Feature> {
+fn exactly_met(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<Feature> {
     let volumes = exact::volumes(line, triangle);
     let met = volumes.iter().any(|v| *v < 0.0) != volumes.iter().any(|v| *v > 0.0);
     // The line passes through the edge opposite to a vertex whose volume is zero.
     let [b, c, a] = volumes.map(|volume| volume == 0.0);
-    let [p, q, r] = triangle;
+    let [p, q, r] = *triangle;
     met.then_some(match (a, b, c) {
         (false, false, false) => Feature::Face,
         (true, false, false) => Feature::Edge([q, r]),
@@ -127,44 +132,59 @@ fn exactly_met(line: &Line, triangle: [[f32; 3]; 3]) -> Option<Feature> {
 
 /// The weights of the second and the third vertex where the line meets the triangle, by the same operations
 /// whatever decided that it does; 0 when they cannot be told.
-pub(crate) fn weights(line: &Line, triangle: [[f32; 3]; 3]) -> [f64; 2] {
-    let PlaneMeeting { weights, along, .. } = plane_meeting(line, triangle);
-    if along == 0.0 { [0.0; 2] } else { weights }
+pub(crate) fn weights(line: &Line, triangle: &[[f32; 3]; 3]) -> [f64; 2] {
+    told(&plane_meeting(line, triangle))
+}
+
+/// The weights of a meeting, or 0.
+fn told(PlaneMeeting { weights, along, .. }: &PlaneMeeting<f64>) -> [f64; 2] {
+    if *along == 0.0 { [0.0; 2] } else { *weights }
 }
 
 /// In line where room is no matter.
 #[cfg_attr(target_pointer_width = "64", inline(always))]
 #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
-fn plane_meeting(line: &Line, triangle: [[f32; 3]; 3]) -> PlaneMeeting<f64> {
-    let wide = |p: [f32; 3]| p.map(f64::from);
-    PlaneMeeting::new(wide(line.origin), wide(line.direction), triangle.map(wide))
+fn plane_meeting(line: &Line, [a, b, c]: &[[f32; 3]; 3]) -> PlaneMeeting<f64> {
+    let wide = |[x, y, z]: [f32; 3]| [f64::from(x), f64::from(y), f64::from(z)];
+    let apart = |p: &[f32; 3], q: &[f32; 3]| plane::minus(wide(*p), wide(*q));
+    PlaneMeeting::new(wide(line.direction), apart(a, &line.origin), [apart(b, a), apart(c, a)])
 }
 
 /// The meeting of the line with the triangle's plane: all that is left to ask for a line that surely
 /// passes between the edges. `None` when it is parallel.
-pub(crate) fn plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    clear_plane(line, triangle).or_else(|| exact_plane(line, triangle))
+#[cfg_attr(target_pointer_width = "64", inline)]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
+pub(crate) fn plane(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<TriangleMeeting> {
+    let met = plane_meeting(line, triangle);
+    clearly(&met).or_else(|| exact_plane(line, triangle, told(&met)))
 }
 
 /// The same, or `None` where the plane is nearly parallel to the line.
 #[inline(always)]
-pub(crate) fn clear_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    let PlaneMeeting { t, t_error, weights, along, clear } = plane_meeting(line, triangle);
-    if clear == 0 {
-        return None;
-    }
-    let (exact, feature) = (false, Feature::Face);
-    Some(TriangleMeeting { t, t_error, weights, front: along < 0.0, exact, feature })
+pub(crate) fn clear_plane(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<TriangleMeeting> {
+    clearly(&plane_meeting(line, triangle))
 }
 
-/// The meeting with the plane, without error.
-pub(crate) fn exact_plane(line: &Line, triangle: [[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    let distance = Distance::new(line, &Meeting::Triangle(triangle))?;
-    let (t, t_error) = distance.approximate();
+/// A meeting, if it is clear.
+#[inline(always)]
+fn clearly(met: &PlaneMeeting<f64>) -> Option<TriangleMeeting> {
+    let PlaneMeeting { t, t_error, weights, along, clear } = *met;
+    let exact = false;
+    (clear != 0).then_some(TriangleMeeting { t, t_error, weights, front: along < 0.0, exact })
+}
+
+/// The meeting with the plane, without error but in the weights.
+#[cold]
+#[inline(never)]
+fn exact_plane(
+    line: &Line,
+    triangle: &[[f32; 3]; 3],
+    weights: [f64; 2],
+) -> Option<TriangleMeeting> {
+    let (t, t_error) = exact::to_plane(line, triangle)?;
     // None of the volumes is of the other sign.
     let front = exact::volumes(line, triangle).iter().any(|v| *v < 0.0);
-    let weights = weights(line, triangle);
-    Some(TriangleMeeting { t, t_error, weights, front, exact: true, feature: Feature::Face })
+    Some(TriangleMeeting { t, t_error, weights, front, exact: true })
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.
@@ -222,8 +242,8 @@ mod tests {
 
     fn shot(origin: [f32; 3], direction: [f32; 3]) -> Option<(f64, [f64; 2], bool)> {
         let line = Line { origin, direction };
-        let meeting = meet(&line, TRIANGLE)?;
-        Some((meeting.t, weights(&line, TRIANGLE), meeting.front))
+        let (meeting, _) = meet(&line, &TRIANGLE)?;
+        Some((meeting.t, weights(&line, &TRIANGLE), meeting.front))
     }
 
     #[test]
@@ -247,7 +267,7 @@ mod tests {
     fn vertices_and_edges_are_told() {
         let feature = |x: f32, y: f32| {
             let line = Line { origin: [x, y, 1.0], direction: [0.0, 0.0, -1.0] };
-            meet(&line, TRIANGLE).expect("a hit").feature
+            meet(&line, &TRIANGLE).expect("a hit").1
         };
         let [a, b, c] = TRIANGLE;
         for (x, y, expected) in [

@@ -27,6 +27,12 @@ impl Aabb {
         aabb
     }
 
+    /// The lower and the upper corner.
+    #[inline(always)]
+    pub fn corners(&self) -> [&[f32; 3]; 2] {
+        [&self.lower, &self.upper]
+    }
+
     /// Grows the box until it holds `other`. Of equal zeros the box's own stays, on every machine.
     pub fn add(&mut self, other: &Aabb) {
         for k in 0..3 {

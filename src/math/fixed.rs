@@ -30,11 +30,13 @@ impl Fixed {
     }
 
     /// Adds the product of three floats, or subtracts it.
-    pub fn add_product(&mut self, factors: [f32; 3], minus: bool) {
-        let [x, y, z] = factors.map(Binary::of);
-        let minus = minus ^ (x.mantissa < 0) ^ (y.mantissa < 0) ^ (z.mantissa < 0);
-        let [p, q, r] = [x, y, z].map(|x| x.mantissa.unsigned_abs());
-        self.add(u64::from(p) * u64::from(q), r, x.exponent + y.exponent + z.exponent, minus);
+    #[inline(never)]
+    pub fn add_product(&mut self, x: f32, y: f32, z: f32, minus: bool) {
+        let (x, y, z) = (Binary::of(x), Binary::of(y), Binary::of(z));
+        let minus = minus ^ ((x.mantissa ^ y.mantissa ^ z.mantissa) < 0);
+        let size = u64::from(x.mantissa.unsigned_abs()) * u64::from(y.mantissa.unsigned_abs());
+        let exponent = x.exponent + y.exponent + z.exponent;
+        self.add(size, z.mantissa.unsigned_abs(), exponent, minus);
     }
 
     /// Adds `p * q * 2^exponent`, or subtracts it.

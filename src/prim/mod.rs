@@ -77,7 +77,7 @@ impl Leaves<'_> {
     ) -> bool {
         for (number, block) in self.triangle_blocks.iter().enumerate() {
             query.watch().step();
-            let part = slab.part(&block.aabb, query.t_bound());
+            let part = slab.part(block.aabb.corners(), query.t_bound());
             if part.is_empty() {
                 continue;
             }
@@ -322,5 +322,5 @@ fn consider<Q: Query>(
 /// Whether the ray comes near a block, in `f64`.
 #[inline(never)]
 fn is_near(ray: &PreparedRay, block: &TriangleBlock, t_bound: f32) -> bool {
-    !WideSlab::new(ray).part(&block.aabb, t_bound).is_empty()
+    !WideSlab::new(ray).part(block.aabb.corners(), t_bound).is_empty()
 }

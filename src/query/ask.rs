@@ -2,6 +2,7 @@
 
 use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
 use crate::ray::PreparedRay;
+use crate::simd::SMALL;
 
 /// The closest hit: least `t`, and of equal ones the first primitive.
 ///
@@ -30,6 +31,10 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     #[cfg_attr(target_pointer_width = "64", inline(always))]
     #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
     fn consider(&mut self, ray: &PreparedRay, met: &D::Met) {
+        // Asked here, real arithmetic does not stand on the stack above what found the meeting.
+        if SMALL && !D::is_met(ray, met, &mut self.watch) {
+            return;
+        }
         if !self.filter.faces(met.front()) {
             return;
         }
@@ -71,7 +76,11 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         };
         if !known
             && self.filter.sees(lane.place, true)
-            && let Some(met) = &D::triangle(ray, lane, &mut self.watch)
+            && let Some(met) = &if SMALL {
+                D::likely(ray, lane, &mut self.watch)
+            } else {
+                D::triangle(ray, lane, &mut self.watch)
+            }
         {
             self.consider(ray, met);
         }

@@ -4,8 +4,8 @@ use core::cmp::Ordering;
 
 use super::{Decide, Meets, SphereLane, TriangleLane, Watch, clamped_weights};
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES, LeafRef, Place, block_ref};
-use crate::exact::{Distance, Line, Meeting};
-use crate::interval::plane::PlaneMeeting;
+use crate::exact::{self, Distance, Line, Meeting};
+use crate::interval::plane::{PlaneMeeting, minus};
 use crate::interval::triangle::{Feature, TriangleMeeting};
 use crate::interval::{sphere, triangle};
 use crate::ray::{Interval, PreparedRay};
@@ -30,6 +30,8 @@ pub(crate) struct ExactMet {
     place: Place,
     front: bool,
     skippable: bool,
+    /// Whether only real arithmetic can tell if it is within the ray's limits.
+    in_doubt: bool,
 }
 
 impl Meets for ExactMet {
@@ -82,39 +84,11 @@ impl ExactMet {
         LeafRef { block: block_ref(kind, self.place.block), lanes: 1 << self.place.lane }
     }
 
-    /// The meeting, if its real `t` is within the ray's limits.
-    #[inline(always)]
-    fn limited(self, ray: &PreparedRay, watch: &mut impl Watch) -> Option<Self> {
-        let (t_min, t_max) = (ray.given.t_min, ray.given.t_max);
-        let inside = match within(self.interval(), f64::from(t_min), f64::from(t_max)) {
-            Within::None => false,
-            Within::All => true,
-            Within::Part => {
-                watch.exact();
-                self.is_within(ray)
-            }
-        };
-        inside.then_some(self)
-    }
-
-    /// Whether the real `t` is within the ray's limits, in real arithmetic.
-    ///
-    /// By value, here and below: what only a copy of is lent out of line can stay in registers, and what is written to memory
-    /// by parts is slow to read as a whole.
-    #[cold]
-    #[inline(never)]
-    fn is_within(self, ray: &PreparedRay) -> bool {
-        Distance::new(&ray.line(), &self.meeting).is_some_and(|t| {
-            t.compare_with(ray.given.t_min) != Ordering::Less
-                && t.compare_with(ray.given.t_max) != Ordering::Greater
-        })
-    }
-
     /// Whether this comes before `best`, whose interval overlaps with this one's.
     #[cold]
     #[inline(never)]
     fn is_really_before(
-        self,
+        &self,
         ray: &PreparedRay,
         best: &ExactMet,
         prim_ids: &[u32],
@@ -127,12 +101,12 @@ impl ExactMet {
             return first;
         }
         watch.exact();
-        let distance = |met: &ExactMet| Distance::new(&ray.line(), &met.meeting);
+        let line = ray.line();
         let order = match memory {
-            Some(memory) if !SMALL => {
-                distance(&self).zip(memory.t_of(ray, best)).map(|(mine, best)| mine.compare(best))
-            }
-            _ => distance(&self).zip(distance(best)).map(|(mine, best)| mine.compare(&best)),
+            Some(memory) if !SMALL => Distance::new(&line, &self.meeting)
+                .zip(memory.t_of(ray, best))
+                .map(|(mine, best)| mine.compare(best)),
+            _ => exact::order(&line, &self.meeting, &best.meeting),
         };
         match order {
             Some(Ordering::Less) => true,
@@ -233,9 +207,10 @@ impl Exact {
             watch.exact();
         }
         [0, 1].map(|root| {
+            let (t, t_error) = (both.t[root], both.t_error[root]);
             let met = ExactMet {
-                t: both.t[root],
-                t_error: both.t_error[root],
+                t,
+                t_error,
                 weights: [0.0; 2],
                 meeting: Meeting::Sphere { centre, radius, root },
                 feature: Feature::Face,
@@ -243,8 +218,9 @@ impl Exact {
                 front: root == 0,
                 // A line that only touches meets front and back in one point.
                 skippable: both.touches || root == both.nearest,
+                in_doubt: in_doubt(ray, interval(t, t_error))?,
             };
-            met.limited(ray, watch)
+            Exact::is_met(ray, &met, watch).then_some(met)
         })
     }
 }
@@ -257,37 +233,43 @@ impl Decide for Exact {
     /// In line where room is no matter.
     #[cfg_attr(target_pointer_width = "64", inline(always))]
     #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
-    fn triangle(
-        ray: &PreparedRay,
-        lane: &TriangleLane,
-        watch: &mut impl Watch,
-    ) -> Option<ExactMet> {
+    fn likely(ray: &PreparedRay, lane: &TriangleLane, watch: &mut impl Watch) -> Option<ExactMet> {
         watch.interval();
-        let meeting = match lane.sure {
-            true if !SMALL => triangle::clear_plane(&ray.line(), lane.corners()),
+        let clear = match lane.sure {
+            true if !SMALL => triangle::clear_plane(&ray.line(), &lane.corners()),
             _ => None,
         };
-        let meeting = match meeting {
-            Some(meeting) => meeting,
-            None => {
-                let meeting = any_meeting(ray, *lane)?;
-                if meeting.exact {
-                    watch.exact();
-                }
-                meeting
-            }
+        let (met, feature) = match clear {
+            Some(met) => (met, Feature::Face),
+            None => any_meeting(ray, *lane)?,
         };
-        let met = ExactMet {
-            t: meeting.t,
-            t_error: meeting.t_error,
-            weights: [meeting.weights[0] as f32, meeting.weights[1] as f32],
+        if met.exact {
+            watch.exact();
+        }
+        let in_doubt = in_doubt(ray, interval(met.t, met.t_error))?;
+        Some(ExactMet {
+            t: met.t,
+            t_error: met.t_error,
+            weights: [met.weights[0] as f32, met.weights[1] as f32],
             meeting: Meeting::Triangle(lane.corners()),
-            feature: meeting.feature,
+            feature,
             place: lane.place,
-            front: meeting.front,
+            front: met.front,
             skippable: true,
-        };
-        met.limited(ray, watch)
+            in_doubt,
+        })
+    }
+
+    #[inline(always)]
+    fn is_met(ray: &PreparedRay, met: &ExactMet, watch: &mut impl Watch) -> bool {
+        if !met.in_doubt {
+            return true;
+        }
+        watch.exact();
+        // What only a copy of is lent out of line can stay in registers, and what is written to memory by parts is slow to
+        // read as a whole. Where room is scarce there is no copy, here and below.
+        let copy = met.meeting;
+        is_really_within(ray, if SMALL { &met.meeting } else { &copy })
     }
 
     fn sphere(
@@ -314,6 +296,8 @@ impl Decide for Exact {
         if b.far < a.near {
             return false;
         }
+        let copy = *met;
+        let met = if SMALL { met } else { &copy };
         met.is_really_before(ray, best, prim_ids, memory, watch)
     }
 
@@ -347,12 +331,21 @@ impl Decide for Exact {
     }
 }
 
-/// The meeting with a triangle, also where the line passes its edges closely or hardly crosses its plane.
+/// Whether the real `t` of a meeting is within the ray's limits, in real arithmetic.
+#[cold]
 #[inline(never)]
-fn any_meeting(ray: &PreparedRay, lane: TriangleLane) -> Option<TriangleMeeting> {
+fn is_really_within(ray: &PreparedRay, meeting: &Meeting) -> bool {
+    exact::is_within(&ray.line(), meeting, [ray.given.t_min, ray.given.t_max])
+}
+
+/// The meeting with a triangle, also where the line passes its edges closely or hardly crosses its plane.
+#[cfg_attr(target_pointer_width = "64", inline(never))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(always))]
+fn any_meeting(ray: &PreparedRay, lane: TriangleLane) -> Option<(TriangleMeeting, Feature)> {
+    let (line, corners) = (ray.line(), lane.corners());
     match lane.sure {
-        true => triangle::plane(&ray.line(), lane.corners()),
-        false => triangle::meet(&ray.line(), lane.corners()),
+        true => Some((triangle::plane(&line, &corners)?, Feature::Face)),
+        false => triangle::meet(&line, &corners),
     }
 }
 
@@ -368,7 +361,7 @@ fn planes<S: Simd>(
     let a = [s.widened(ax), s.widened(ay), s.widened(az)];
     let b = [s.widened(bx), s.widened(by), s.widened(bz)];
     let c = [s.widened(cx), s.widened(cy), s.widened(cz)];
-    PlaneMeeting::new(origin, direction, [a, b, c])
+    PlaneMeeting::new(direction, minus(a, origin), [minus(b, a), minus(c, a)])
 }
 
 /// A part of the error more, for the arithmetic of the error.
@@ -389,21 +382,13 @@ fn surely_rounded(Interval { near, far }: Interval<f64>, t: f64) -> Option<f32> 
     (near as f32 == nearest && far as f32 == nearest).then_some(nearest + 0.0)
 }
 
-/// Whether all of an interval lies within the limits, or only a part of it, or none.
-#[inline(always)]
-fn within(part: Interval<f64>, t_min: f64, t_max: f64) -> Within {
+/// Whether it takes real arithmetic to know if what lies in an interval is within the ray's limits; `None` if it surely is not.
+#[cfg_attr(target_pointer_width = "64", inline(always))]
+#[cfg_attr(not(target_pointer_width = "64"), inline(never))]
+fn in_doubt(ray: &PreparedRay, part: Interval<f64>) -> Option<bool> {
+    let (t_min, t_max) = (f64::from(ray.given.t_min), f64::from(ray.given.t_max));
     if part.far < t_min || part.near > t_max {
-        Within::None
-    } else if part.near >= t_min && part.far <= t_max {
-        Within::All
-    } else {
-        Within::Part
+        return None;
     }
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Within {
-    None,
-    Part,
-    All,
+    Some(!(part.near >= t_min && part.far <= t_max))
 }

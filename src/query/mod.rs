@@ -189,11 +189,24 @@ pub(crate) trait Decide {
     const ANY_BOXES: bool;
 
     /// The meeting with a triangle that the filter could not reject.
+    #[inline(always)]
     fn triangle(
         ray: &PreparedRay,
         lane: &TriangleLane,
         watch: &mut impl Watch,
-    ) -> Option<Self::Met>;
+    ) -> Option<Self::Met> {
+        let met = Self::likely(ray, lane, watch)?;
+        Self::is_met(ray, &met, watch).then_some(met)
+    }
+
+    /// The same, if [`is_met`](Self::is_met) says so.
+    fn likely(ray: &PreparedRay, lane: &TriangleLane, watch: &mut impl Watch) -> Option<Self::Met>;
+
+    /// Whether what is likely is so.
+    #[inline(always)]
+    fn is_met(_ray: &PreparedRay, _met: &Self::Met, _watch: &mut impl Watch) -> bool {
+        true
+    }
 
     /// The meetings with a sphere that lie within the limits, entering and leaving.
     fn sphere(

@@ -45,11 +45,7 @@ impl Decide for Watertight {
     const ANY_BOXES: bool = false;
     type Memory = ();
 
-    fn triangle(
-        ray: &PreparedRay,
-        lane: &TriangleLane,
-        _: &mut impl Watch,
-    ) -> Option<WatertightMet> {
+    fn likely(ray: &PreparedRay, lane: &TriangleLane, _: &mut impl Watch) -> Option<WatertightMet> {
         let detail = sieve::detail(ray, lane.corners());
         if detail.t + detail.t_error < ray.t_min || detail.t - detail.t_error > ray.t_max {
             return None;

@@ -98,9 +98,9 @@ fn boxes_hold(random: &mut Random, ray: &PreparedRay, reach: f32) -> bool {
     };
     let narrow = narrow(ray, reach);
     let framed = FrameSlab::new(ray, reach);
-    holds(&|bound| WideSlab::new(ray).part(&aabb, bound))
-        && holds(&|bound| framed.part(&aabb, bound))
-        && narrow.is_none_or(|slab| holds(&|bound| slab.part(&aabb, bound)))
+    holds(&|bound| WideSlab::new(ray).part(aabb.corners(), bound))
+        && holds(&|bound| framed.part(aabb.corners(), bound))
+        && narrow.is_none_or(|slab| holds(&|bound| slab.part(aabb.corners(), bound)))
 }
 
 #[test]

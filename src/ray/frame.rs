@@ -108,9 +108,8 @@ pub(super) fn scale_below(x: f32) -> f32 {
 /// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
 /// infinities and NaN above the others.
 #[cfg_attr(target_os = "none", inline(never))]
-pub(super) fn largest_bits(v: [f32; 3]) -> u32 {
-    let [x, y, z] = v.map(|x| x.to_bits() & !(1 << 31));
-    x.max(y).max(z)
+pub(super) fn largest_bits(v: &[f32; 3]) -> u32 {
+    v.iter().fold(0, |most, x| most.max(x.abs().to_bits()))
 }
 
 /// The exponent `e` with `|x| < 2^e` by the bits of `|x|`, at least -126; 129 for infinity.
@@ -146,9 +145,11 @@ fn above(t: f32, scale: f32) -> f32 {
 }
 
 /// `t * 2^n` of a finite `t`, which is a float unless it is not a normal one. Out of line, and without `f64`.
-#[inline(never)]
+#[cfg_attr(target_os = "none", inline(always))]
+#[cfg_attr(not(target_os = "none"), inline(never))]
 fn rounded(t: f32, n: i32, round: Round) -> f32 {
-    let exact = if (-126..=127).contains(&n) { scaled(t, narrow_power_of_two(n)) } else { None };
+    let in_floats = !SMALL && (-126..=127).contains(&n);
+    let exact = if in_floats { scaled(t, narrow_power_of_two(n)) } else { None };
     match exact {
         Some(product) if product.abs() <= f32::MAX => product,
         _ => scaled_by(t, n, round),
@@ -247,11 +248,21 @@ impl Ray {
         }
     }
 
+    /// The axis of the largest component of the direction, the last of equal ones: of these bits, but for the sign.
+    fn depth_axis(&self, longest: u32) -> Axis {
+        let [_, y, z] = &self.direction;
+        match () {
+            () if z.abs().to_bits() == longest => Axis::Z,
+            () if y.abs().to_bits() == longest => Axis::Y,
+            () => Axis::X,
+        }
+    }
+
     /// What traversal needs of any ray, or `None` for one that hits nothing by definition. Ordinary rays get the same as from
     /// [`prepare_with`](Self::prepare_with), by longer ways.
     #[inline(never)]
     pub(crate) fn prepare_any(&self, reach: f32) -> Option<PreparedRay> {
-        let (farthest, longest) = (largest_bits(self.origin), largest_bits(self.direction));
+        let (farthest, longest) = (largest_bits(&self.origin), largest_bits(&self.direction));
         let [t_min, t_max] = self.finite_limits();
         let finite = farthest < EXPONENT && longest < EXPONENT;
         if !(finite && longest > 0 && t_min <= t_max) {
@@ -262,12 +273,15 @@ impl Ray {
         let scale = narrow_power_of_two(-exponent);
         // Subnormal components have no exponent of their own: a first step brings them up.
         let lift = if longest < f32::MIN_POSITIVE.to_bits() { 24 } else { 0 };
-        let lifted = self.direction.map(|x| x * narrow_power_of_two(lift));
-        let length = exponent_above(largest_bits(lifted)) - 1;
-        let [x, y, z] = lifted.map(|x| x * narrow_power_of_two(-length));
-        let direction = [x, y, z, 0.0];
-        let [x, y, z] = self.origin.map(|x| x * scale);
-        let origin = [x, y, z, 0.0];
+        let up = narrow_power_of_two(lift);
+        let length = exponent_above((f32::from_bits(longest) * up).to_bits()) - 1;
+        let down = narrow_power_of_two(-length);
+        let (mut origin, mut direction) = ([0.0; 4], [0.0; 4]);
+        for k in 0..3 {
+            origin[k] = self.origin[k] * scale;
+            direction[k] = self.direction[k] * up * down;
+        }
+        let depth = self.depth_axis(longest);
         let t_exponent = length - lift - exponent;
         let t_min_below = rounded(t_min, t_exponent, Round::Below);
         Some(PreparedRay {
@@ -278,7 +292,7 @@ impl Ray {
             t_scale: power_of_two(t_exponent),
             t_min: t_min_below,
             t_max: rounded(t_max, t_exponent, Round::Above),
-            shear: Shear::new(depth_axis(direction), &origin, &direction, scale, t_min_below),
+            shear: Shear::new(depth, &origin, &direction, scale, t_min_below),
         })
     }
 }
@@ -333,16 +347,6 @@ impl Late for Early {
     #[inline(always)]
     fn prepare(&self) -> PreparedRay {
         PreparedRay::BLANK
-    }
-}
-
-/// The axis of the largest component, the last of equal ones.
-fn depth_axis([x, y, z, _]: [f32; 4]) -> Axis {
-    let [x, y, z] = [x, y, z].map(f32::abs);
-    match (z >= x && z >= y, y >= x) {
-        (true, _) => Axis::Z,
-        (false, true) => Axis::Y,
-        (false, false) => Axis::X,
     }
 }
 
@@ -485,11 +489,11 @@ mod tests {
                 for length in sizes {
                     let ray = Ray::new([origin, 0.0, -origin], [length, -length / 3.0, 0.0]);
                     let ray = ray.prepare(reach).expect("a valid ray");
-                    let longest = f32::from_bits(largest_bits(three(ray.direction)));
+                    let longest = f32::from_bits(largest_bits(&three(ray.direction)));
                     assert!((1.0..2.0).contains(&longest), "{length} {longest}");
                     let size = origin.max(reach);
                     let reach = size.min(f32::MAX) * ray.scale;
-                    assert!(largest_bits(three(ray.origin)) <= reach.to_bits() && reach <= 4.0);
+                    assert!(largest_bits(&three(ray.origin)) <= reach.to_bits() && reach <= 4.0);
                     if size >= 1e-37 {
                         assert!(reach >= 0.5, "{size} {reach}");
                     }

@@ -17,13 +17,13 @@ use crate::simd::{Lanes, SMALL, Scalar, Simd, Width, mul_sub};
 ///
 /// A zero component of the direction is allowed: the walls are chosen by its sign bit.
 pub(crate) trait Slab: Copy {
-    /// The part of the ray inside the box.
-    fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32>;
+    /// The part of the ray inside the box between two corners, lent where they are.
+    fn part(&self, corners: [&[f32; 3]; 2], t_bound: f32) -> Interval<f32>;
 
     /// The same by a backend's vectors of an axis a lane: the same bits.
     #[inline(always)]
     fn part_by<S: Simd>(&self, _: S, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
-        self.part(aabb, t_bound)
+        self.part(aabb.corners(), t_bound)
     }
 
     /// The same for `N` boxes at once.
@@ -112,20 +112,17 @@ impl NarrowSlab {
 }
 
 impl Slab for NarrowSlab {
-    /// No division, no branch, but where code shall be small, as operations take long there.
-    fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
+    /// No division, no branch.
+    fn part(&self, [lower, upper]: [&[f32; 3]; 2], t_bound: f32) -> Interval<f32> {
         let (mut near, mut far) = (self.t_min, t_bound);
         for k in 0..3 {
             let r = self.reciprocal[k];
-            let (lower, upper) = (aabb.lower[k], aabb.upper[k]);
+            let (lower, upper) = (lower[k], upper[k]);
             let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
             let enter = first * r - self.near_shift[k];
             let leave = last * r - self.far_shift[k];
-            near = if less(near, enter) { enter } else { near };
-            far = if less(leave, far) { leave } else { far };
-            if SMALL && less(far, near) {
-                break;
-            }
+            near = if enter > near { enter } else { near };
+            far = if leave < far { leave } else { far };
         }
         Interval { near, far }
     }
@@ -134,7 +131,7 @@ impl Slab for NarrowSlab {
     #[inline(always)]
     fn part_by<S: Simd>(&self, s: S, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
         if SMALL {
-            return self.part(aabb, t_bound);
+            return self.part(aabb.corners(), t_bound);
         }
         let ([a, b, c], [x, y, z]) = (aabb.lower, aabb.upper);
         let r = Width::<4>::load(s, &self.reciprocal);
@@ -242,7 +239,9 @@ impl<S, V: Copy> NarrowBoxes<S, V> {
 /// What a wall loses by that is below 2^-149 of what it is padded by. A wall that is infinite stays so.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameSlab {
-    narrow: NarrowSlab,
+    /// Of each axis the reciprocal, with the sign of the direction, and the shifts of near and far walls: see [`NarrowSlab`].
+    axes: [[f32; 3]; 3],
+    t_min: f32,
     scale: Option<f32>,
 }
 
@@ -250,32 +249,24 @@ impl FrameSlab {
     /// For boxes within `reach`, of which infinity says nothing.
     #[inline(never)]
     pub fn new(ray: &PreparedRay, reach: f32) -> Self {
-        let PreparedRay { given, scale, origin, direction, .. } = ray;
-        let [x, y, z, _] = *direction;
-        let slowest = largest([x, y, z]) * SLOWEST;
+        let PreparedRay { given, scale, origin, direction, t_min, .. } = ray;
+        let slowest = ray.shear.depth_rate * SLOWEST;
         let reach = if reach < f32::MAX { larger(0.0, reach) } else { f32::MAX };
-        let reach = larger(reach, largest(given.origin));
+        let reach = larger(reach, f32::from_bits(largest_bits(&given.origin)));
         let is_ordinary = is_ordinary(reach);
         let scales = Scales { t: 1.0, space: 1.0 };
-        let mut narrow = NarrowSlab { t_min: ray.t_min, ..NarrowSlab::BLANK };
-        for k in 0..3 {
-            let (o, d) = (origin[k], direction[k]);
-            let lines = [[o], [d], [1.0 / larger(d.abs(), slowest)]];
+        let ahead = if is_ordinary { *scale } else { 1.0 };
+        let mut axes = [[slowest; 3]; 3];
+        for (axis, (o, d)) in axes.iter_mut().zip(origin.iter().zip(direction)) {
+            let lines = [[*o], [*d], [1.0 / larger(d.abs(), slowest)]];
             let [[reciprocal], [near_shift], [far_shift]] =
                 walls::<_, 1>(Scalar, lines, scales, reach * scale);
             // Nothing is lost if boxes are scaled by this.
-            narrow.reciprocal[k] = if is_ordinary { reciprocal * scale } else { reciprocal };
-            narrow.near_shift[k] = near_shift;
-            narrow.far_shift[k] = far_shift;
-            narrow.backwards[k] = d.is_sign_negative();
+            let reciprocal = reciprocal * ahead;
+            *axis = [reciprocal, near_shift, far_shift];
         }
-        FrameSlab { narrow, scale: (!is_ordinary).then_some(*scale) }
+        FrameSlab { axes, t_min: *t_min, scale: (!is_ordinary).then_some(*scale) }
     }
-}
-
-/// The largest size of these.
-fn largest(v: [f32; 3]) -> f32 {
-    f32::from_bits(largest_bits(v))
 }
 
 fn larger(x: f32, y: f32) -> f32 {
@@ -283,14 +274,25 @@ fn larger(x: f32, y: f32) -> f32 {
 }
 
 impl Slab for FrameSlab {
-    fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
-        match self.scale {
-            None => self.narrow.part(aabb, t_bound),
-            Some(scale) => {
-                let [lower, upper] = [aabb.lower, aabb.upper].map(|p| p.map(|x| x * scale));
-                self.narrow.part(&Aabb { lower, upper }, t_bound)
+    /// Ends early, and compares as is cheapest: this is also for processors on which each operation takes long.
+    fn part(&self, [lower, upper]: [&[f32; 3]; 2], t_bound: f32) -> Interval<f32> {
+        let (mut near, mut far) = (self.t_min, t_bound);
+        for k in 0..3 {
+            let [r, near_shift, far_shift] = self.axes[k];
+            let (lower, upper) = match self.scale {
+                None => (lower[k], upper[k]),
+                Some(scale) => (lower[k] * scale, upper[k] * scale),
+            };
+            let (first, last) = if r.is_sign_negative() { (upper, lower) } else { (lower, upper) };
+            let enter = first * r - near_shift;
+            let leave = last * r - far_shift;
+            near = if less(near, enter) { enter } else { near };
+            far = if less(leave, far) { leave } else { far };
+            if less(far, near) {
+                break;
             }
         }
+        Interval { near, far }
     }
 
     #[inline(always)]
@@ -352,8 +354,8 @@ impl WideSlab {
 }
 
 impl Slab for WideSlab {
-    fn part(&self, aabb: &Aabb, t_bound: f32) -> Interval<f32> {
-        let part = self.clip(wide(aabb.lower), wide(aabb.upper), f64::from(t_bound));
+    fn part(&self, [lower, upper]: [&[f32; 3]; 2], t_bound: f32) -> Interval<f32> {
+        let part = self.clip(wide(*lower), wide(*upper), f64::from(t_bound));
         Interval { near: f32_below(part.near), far: f32_above(part.far) }
     }
 
@@ -370,10 +372,10 @@ impl<L: Slab, S: Width<N>, const N: usize> WideBoxes<S, N> for (&L, S) {
         t_bound.store(&mut bounds);
         for (lane, near) in near.iter_mut().enumerate() {
             let corner = |first: usize| [0, 1, 2].map(|k| walls[first + k][lane]);
-            let aabb = Aabb { lower: corner(0), upper: corner(3) };
-            let part = self.0.part(&aabb, bounds[lane]);
+            let (lower, upper) = (corner(0), corner(3));
+            let part = self.0.part([&lower, &upper], bounds[lane]);
             // A lane without a child is an empty box with infinite walls.
-            let entered = !part.is_empty() && aabb.lower[0] <= aabb.upper[0];
+            let entered = !part.is_empty() && lower[0] <= upper[0];
             mask |= u32::from(entered) << lane;
             *near = part.near;
         }
@@ -393,7 +395,8 @@ mod tests {
         let ray = ray.prepare(1.0).expect("a valid ray");
         let (_, narrow) = ray.given.prepare_with(Scalar, 1.0).expect("an ordinary ray");
         // In given units, as the frame's are twice as long or half.
-        [narrow.part(&UNIT_BOX, ray.t_max), WideSlab::new(&ray).part(&UNIT_BOX, ray.t_max)].map(
+        let corners = UNIT_BOX.corners();
+        [narrow.part(corners, ray.t_max), WideSlab::new(&ray).part(corners, ray.t_max)].map(
             |part| {
                 let given = |t: f32| (f64::from(t) / ray.t_scale) as f32;
                 Interval { near: given(part.near), far: given(part.far) }

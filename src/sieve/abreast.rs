@@ -4,8 +4,8 @@ use super::areas::{Across, AreaError, Areas};
 use super::beside::not_beside;
 use super::meetings::{Meetings, Middle};
 use crate::block::leaf::TriangleBlock;
-use crate::math::Bits;
 use crate::math::rounding::UNIT32;
+use crate::math::{Aabb, Bits};
 use crate::ray::{Abreast, Alike, Sixteen, Spread};
 use crate::simd::{Lanes, Simd, Width, mul_sub};
 
@@ -44,8 +44,8 @@ impl<'b> Opened<'b> {
 
     #[inline(always)]
     fn middle<S: Width<16>>(&self, s: S, origin_depth: S::V) -> Middle<S::V> {
-        let axis = (self.alike.axes[2], self.alike.depth_scale());
-        Middle::of(s, axis, origin_depth, &self.block.aabb)
+        let (k, Aabb { lower, upper }) = (self.alike.axes[2], &self.block.aabb);
+        Middle::of(s, self.alike.depth_scale(), origin_depth, [lower[k], upper[k]])
     }
 }
 

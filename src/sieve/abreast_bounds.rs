@@ -66,7 +66,8 @@ fn packet_is_right(random: &mut Random, worst: &mut Worst) -> Result<u32, u32> {
     for (i, ray) in rays.iter().enumerate() {
         let line = Line { origin: ray.origin, direction: ray.direction };
         let Some(prepared) = ray.prepare(reach) else { continue };
-        let met = interval::triangle::meet(&line, corners)
+        let met = interval::triangle::meet(&line, &corners)
+            .map(|(met, _)| met)
             .filter(|_| is_within(&line, &Meeting::Triangle(corners), &prepared));
         let (candidate, clear) = (found.candidates >> i & 1 == 1, found.clear >> i & 1 == 1);
         let right = match met {

@@ -101,7 +101,10 @@ fn triangle_is_right(random: &mut Random, worst: &mut TriangleWorst) -> bool {
     let target = mix(mix(a, b, weight(random)), c, weight(random));
     let ray = aimed(random, origin, target);
     let line = Line { origin, direction: ray.direction };
-    let met = ray.prepare(reach).and_then(|_| interval::triangle::meet(&line, corners));
+    let met = ray
+        .prepare(reach)
+        .and_then(|_| interval::triangle::meet(&line, &corners))
+        .map(|(met, _)| met);
     let Some(ray) = limited(random, ray, met.map(|met| met.t)).prepare(reach) else { return true };
     let far = met.map(|met| ray.t_above(met.t, met.t_error * 1.01));
     let bound = far.filter(|_| random.below(2) == 0).unwrap_or(ray.t_max).min(ray.t_max);

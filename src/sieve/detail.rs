@@ -2,11 +2,10 @@
 
 use glam::Vec3;
 
-use super::areas::{Across, Along, area};
+use super::areas::{Across, area};
 use super::meetings::Middle;
-use super::triangle::{One, sheared};
+use super::triangle::{One, all_sheared};
 use super::vector::{cross, dot, sum_abs};
-use crate::math::Aabb;
 use crate::math::float::limited;
 use crate::math::rounding::UNIT32;
 use crate::ray::{PreparedRay, TINY};
@@ -26,42 +25,38 @@ pub(crate) struct TriangleDetail {
 
 /// What `f32` knows of a triangle that the filter does not reject.
 pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
-    let Some(Plane { t, t_error, front }) = plane(ray, corners) else {
-        return edge_on(ray, corners);
-    };
-    let [a, b, c] = corners.map(|v| sheared(ray, v));
-    let [over_a, over_b, over_c] = over([&a.1, &b.1, &c.1]);
-    let total = over_a + over_b + over_c;
-    let [nearest, farthest] = extremes([a.0, b.0, c.0]);
     let rate = ray.shear.depth_rate;
+    let (depth, t_error, front) = match plane(ray, corners) {
+        Some(Plane { t, t_error, front }) => (t * rate, t_error, Some(front)),
+        None => edge_on(ray, corners),
+    };
+    let [(a_along, a), (b_along, b), (c_along, c)] = all_sheared(ray, &corners);
+    let [over_a, over_b, over_c] = over([&a, &b, &c]);
+    let total = over_a + over_b + over_c;
+    let [nearest, farthest] = extremes([a_along.depth[0], b_along.depth[0], c_along.depth[0]]);
     TriangleDetail {
-        t: limited(t * rate, nearest, farthest) / rate,
+        // A NaN, from 0 / 0, loses to the depths of the vertices.
+        t: limited(depth, nearest, farthest) / rate,
         t_error,
         weights: [over_b / total, over_c / total],
-        front: Some(front),
+        front,
     }
 }
 
-/// The same where the plane hardly tells where the ray meets it.
+/// The depth at which the ray meets a triangle whose plane hardly tells, what the frame's `t` may be off, and the side.
 #[cold]
 #[inline(never)]
-fn edge_on(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
-    let middle = Middle::of_one(ray, &Aabb::around(&corners));
+fn edge_on(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> (f32, f32, Option<bool>) {
+    let ([a, b, c], k) = (corners, ray.shear.axes[2] as usize);
+    let middle = Middle::between(ray, extremes([a[k], b[k], c[k]]));
     let One { areas, meetings } = One::new(ray, &middle, corners);
     let [[over_a], [over_b], [over_c]] = areas.over;
     let ([area_error], [size_of_total], [rise]) = (areas.error, meetings.total, meetings.rise);
     let total = over_a + over_b + over_c;
-    let [nearest, farthest] = extremes(corners.map(|v| sheared(ray, v).0));
     // The total carries the errors of three areas, and less than as much again of its own.
     let is_clear = size_of_total > 6.0 * area_error;
-    // A NaN, from 0 / 0, loses to the depths of the vertices.
-    let depth = limited(middle.depth[0] + rise / size_of_total, nearest, farthest);
-    TriangleDetail {
-        t: depth / ray.shear.depth_rate,
-        t_error: f32::INFINITY,
-        weights: [over_b / total, over_c / total],
-        front: is_clear.then_some((total < 0.0) == (ray.shear.depth_scale > 0.0)),
-    }
+    let front = is_clear.then_some((total < 0.0) == (ray.shear.depth_scale > 0.0));
+    (middle.depth[0] + rise / size_of_total, f32::INFINITY, front)
 }
 
 /// The areas over each of three vertices.
@@ -69,9 +64,8 @@ fn over([a, b, c]: [&Across<[f32; 1]>; 3]) -> [f32; 3] {
     [area::<_, false, 1>(b, c)[0], area::<_, false, 1>(c, a)[0], area::<_, false, 1>(a, b)[0]]
 }
 
-/// The least and the largest depth of three vertices.
-fn extremes(along: [Along<[f32; 1]>; 3]) -> [f32; 2] {
-    let [a, b, c] = along.map(|v| v.depth[0]);
+/// The least and the largest of three.
+fn extremes([a, b, c]: [f32; 3]) -> [f32; 2] {
     let (low, high) = if a < b { (a, b) } else { (b, a) };
     [if low < c { low } else { c }, if high > c { high } else { c }]
 }

@@ -19,20 +19,20 @@ pub(super) struct Middle<V> {
 }
 
 impl<V: Copy> Middle<V> {
-    /// For rays of one frame along the axis `k`, whose `depth_scale` brings given coordinates to depths.
+    /// Between two given coordinates along the axis of rays of one frame, whose `depth_scale` brings these to depths.
     #[inline(always)]
     pub fn of<S: Width<N, V = V>, const N: usize>(
         s: S,
-        (k, depth_scale): (usize, f32),
+        depth_scale: f32,
         origin_depth: V,
-        aabb: &Aabb,
+        [lower, upper]: [f32; 2],
     ) -> Self
     where
         V: Lanes<N>,
     {
         // Halves, as a sum of given coordinates may overflow.
         let scale = 0.5 * depth_scale;
-        let (lower, upper) = (aabb.lower[k] * scale, aabb.upper[k] * scale);
+        let (lower, upper) = (lower * scale, upper * scale);
         let (raw, half) = (lower + upper, (upper - lower).abs());
         let depth = s.splat(raw).sub(origin_depth);
         // What half and middle were rounded by, and what fell below the frame's least float.
@@ -84,11 +84,18 @@ impl<V: Copy> Middle<V> {
 }
 
 impl Middle<[f32; 1]> {
-    /// For one ray.
+    /// Of a box for one ray.
     #[inline(always)]
     pub fn of_one(ray: &PreparedRay, aabb: &Aabb) -> Self {
-        let shear = &ray.shear;
-        Middle::of(Scalar, (shear.axes[2] as usize, shear.depth_scale), [shear.origin_depth], aabb)
+        let k = ray.shear.axes[2] as usize;
+        Middle::between(ray, [aabb.lower[k], aabb.upper[k]])
+    }
+
+    /// Between two given coordinates along the axis of one ray.
+    #[cfg_attr(target_os = "none", inline(never))]
+    #[cfg_attr(not(target_os = "none"), inline(always))]
+    pub fn between(ray: &PreparedRay, ends: [f32; 2]) -> Self {
+        Middle::of(Scalar, ray.shear.depth_scale, [ray.shear.origin_depth], ends)
     }
 }
 

@@ -206,7 +206,7 @@ impl Corners {
         middle: &Middle<[f32; 1]>,
         corners: [[f32; 3]; 3],
     ) -> (Self, Areas<[f32; 1]>) {
-        let corners = corners.map(|v| sheared(ray, v));
+        let corners = all_sheared(ray, &corners);
         let depths = corners.map(|v| [v.0.raw[0] - middle.raw]);
         let across = corners.map(|v| v.1);
         let [a, b, c] = [across[0].size(), across[1].size(), across[2].size()];
@@ -239,7 +239,19 @@ impl One {
     }
 }
 
-pub(super) fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> (Along<[f32; 1]>, Across<[f32; 1]>) {
+/// A vertex in the sheared space.
+type Sheared = (Along<[f32; 1]>, Across<[f32; 1]>);
+
+/// The corners of a triangle there.
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
+pub(super) fn all_sheared(ray: &PreparedRay, [a, b, c]: &[[f32; 3]; 3]) -> [Sheared; 3] {
+    [sheared(ray, a), sheared(ray, b), sheared(ray, c)]
+}
+
+#[cfg_attr(target_os = "none", inline(never))]
+#[cfg_attr(not(target_os = "none"), inline(always))]
+fn sheared(ray: &PreparedRay, vertex: &[f32; 3]) -> Sheared {
     let vertex = vertex.map(|x| [x]);
     let along = Along::new(Scalar, ray, &vertex);
     (along, Across::new::<Scalar, false, 1>(Scalar, ray, &vertex, &along))
@@ -261,7 +273,7 @@ pub(super) mod single {
 
     pub fn sheared(ray: &PreparedRay, vertex: [f32; 3]) -> Sheared {
         let (Along { depth: [depth], .. }, Across { x: [x], y: [y], .. }) =
-            super::sheared(ray, vertex);
+            super::sheared(ray, &vertex);
         Sheared { x: -x, y: -y, depth }
     }
 

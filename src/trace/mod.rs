@@ -3,9 +3,7 @@
 mod questions;
 mod settle;
 
-pub(crate) use questions::{
-    AnyHit, ClosestHit, ClosestMet, LocateHit, MEMORY, any_hit, closest_hit,
-};
+pub(crate) use questions::{AnyHit, ClosestHit, ClosestMet, LocateHit, MEMORY, either_hit};
 pub(crate) use settle::{Firsts, Together};
 
 use crate::block::leaf::Place;

@@ -126,43 +126,22 @@ impl<'m, D: Decide, W: Watch> Question<'m> for EitherHit<D, W> {
     }
 }
 
-/// The closest hit of a block without what is in instances.
+/// The closest hit of a block without what is in instances or, with `any`, [`Hit::MISS`] if anything is hit.
 #[inline(always)]
-pub(crate) fn closest_hit<D: Decide, W: Watch>(
-    block: Finished,
-    ray: &Ray,
-    choice: Choice,
-    watch: W,
-) -> Option<Hit> {
-    if SMALL {
-        return either_hit::<D, W>(block, ray, choice, watch, false);
-    }
-    ask(block, ray, ClosestHit::<D, W, MEMORY>::new(choice, watch))
-}
-
-/// Whether anything is hit in a block without what is in instances.
-#[inline(always)]
-pub(crate) fn any_hit<D: Decide, W: Watch>(
-    block: Finished,
-    ray: &Ray,
-    choice: Choice,
-    watch: W,
-) -> bool {
-    if SMALL {
-        return either_hit::<D, W>(block, ray, choice, watch, true).is_some();
-    }
-    ask(block, ray, AnyHit::<D, W>::new(choice, watch))
-}
-
-#[inline(never)]
-fn either_hit<D: Decide, W: Watch>(
+pub(crate) fn either_hit<D: Decide, W: Watch>(
     block: Finished,
     ray: &Ray,
     choice: Choice,
     watch: W,
     any: bool,
 ) -> Option<Hit> {
-    ask(block, ray, EitherHit::<D, W> { choice, watch, any, decide: PhantomData })
+    match any {
+        _ if SMALL => {
+            ask(block, ray, EitherHit::<D, W> { choice, watch, any, decide: PhantomData })
+        }
+        true => ask(block, ray, AnyHit::<D, W>::new(choice, watch)).then_some(Hit::MISS),
+        false => ask(block, ray, ClosestHit::<D, W, MEMORY>::new(choice, watch)),
+    }
 }
 
 /// A known meeting.
