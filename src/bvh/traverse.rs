@@ -20,7 +20,7 @@ pub(crate) fn traverse<S: Simd, Q: Query>(
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    let mut stack = Pending::new();
+    let mut stack = Pending::NONE;
     let Some(mut node) = nodes.first() else { return false };
     query.watch().step();
     if slab.part(&node.aabb(), query.t_bound()).is_empty() {
