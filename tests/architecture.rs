@@ -11,6 +11,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("math", &[]),
     ("error", &[]),
     ("storage", &[]),
+    ("pending", &[]),
     ("simd", &["math"]),
     ("caller", &["kinds"]),
     ("exact", &["kinds", "math"]),
@@ -35,15 +36,15 @@ const HOUSE: &[(&str, &[&str])] = &[
     (
         "grid",
         &[
-            "block", "caller", "error", "math", "point", "prim", "query", "ray", "scene", "simd",
-            "storage",
+            "block", "caller", "error", "math", "pending", "point", "prim", "query", "ray",
+            "scene", "simd", "storage",
         ],
     ),
     (
         "bvh",
         &[
-            "block", "caller", "error", "kinds", "math", "point", "prim", "query", "ray", "scene",
-            "simd", "storage",
+            "block", "caller", "error", "kinds", "math", "pending", "point", "prim", "query",
+            "ray", "scene", "simd", "storage",
         ],
     ),
     ("surface", &["exact", "instance", "interval", "math"]),
