@@ -355,14 +355,14 @@ impl<'m> Accel<'m> {
     #[cold]
     #[inline(never)]
     fn intersect_levels(&self, ray: &Ray) -> Option<Hit> {
-        self.intersect_with(ray, &QueryOptions::default())
+        levels::closest::<Exact, _>(self.0, ray, &QueryOptions::default(), ())
     }
 
     /// Likewise.
     #[cold]
     #[inline(never)]
     fn occluded_levels(&self, ray: &Ray) -> bool {
-        self.occluded_with(ray, &QueryOptions::default())
+        levels::any::<Exact, _>(self.0, ray, &QueryOptions::default(), ())
     }
 
     #[inline(always)]
