@@ -18,7 +18,7 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("ray", &["exact", "math", "simd"]),
     ("block", &["error", "kinds", "math", "storage"]),
     ("scene", &["block", "math"]),
-    ("instance", &["block", "error", "exact", "math", "ray", "scene"]),
+    ("instance", &["block", "error", "exact", "math", "ray", "scene", "simd"]),
     ("interval", &["exact", "math", "simd"]),
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),

@@ -147,17 +147,15 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
                 return false;
             }
             fetch(s, bundles, leaves, walk.later());
-            if prepared.is_none() {
-                // Many rays pass the whole scene by, so this is worth a question a bundle.
-                if walk.at() == ChildRef::NONE {
-                    return false;
-                }
-                *prepared = Some(late.prepare());
-            }
         }
-        let (false, Some(ray)) = (walk.at() == ChildRef::NONE, prepared.as_ref()) else {
+        if walk.at() == ChildRef::NONE {
             return false;
-        };
+        }
+        // Not before: many rays come to no leaf.
+        if prepared.is_none() {
+            *prepared = Some(late.prepare());
+        }
+        let Some(ray) = prepared.as_ref() else { return false };
         if walk.open(s, leaves, ray, query) {
             return true;
         }
