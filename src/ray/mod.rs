@@ -12,7 +12,7 @@ mod slab;
 pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
-pub(crate) use frame::{Early, Late, PreparedRay, TINY};
+pub(crate) use frame::{Early, Late, Passing, PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, RayPacket, Spread};
 pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
 
