@@ -76,6 +76,11 @@ impl<'b> Packer<'b> {
         self.triangles.blocks
     }
 
+    /// The same of spheres.
+    pub fn sphere_block_count(&self) -> usize {
+        self.spheres.blocks
+    }
+
     /// Lets the next primitive begin a block, of whichever kind it is.
     pub fn close(&mut self) {
         self.triangles.closed = true;

@@ -73,8 +73,8 @@ fn build_as_planned(
         packing.parts_mut(bytes)?;
     let source = Source { scene, geometries, named: false };
     let (triangles, spheres) = prim_ids.split_at(census.triangle_count as usize);
-    let triangle_blocks = pack::pack_triangles(source, triangles, triangle_blocks, caller)? as u32;
-    pack::pack_spheres(source, spheres, triangles.len(), sphere_blocks, caller)?;
+    let triangle_blocks = pack::pack(source, triangles, 0, triangle_blocks, caller)? as u32;
+    pack::pack(source, spheres, triangles.len(), sphere_blocks, caller)?;
     caller.done(0.7)?;
     let packed = Counts { triangle_blocks, ..packing };
     let runs = runs::write(space, packed.parts_mut(bytes)?, caller)?;

@@ -23,14 +23,51 @@ struct Part<'p, B> {
     used: Option<usize>,
 }
 
-/// Packs triangles; returns how many blocks they take.
-pub(super) fn pack_triangles(
+/// A kind of leaf block, and how primitives are packed into blocks of it.
+pub(super) trait Packed: Sized + Copy + Send {
+    /// Primitives that any block has room for.
+    const LEAST: usize;
+
+    /// Fills `blocks` with primitives that begin at entry `first`.
+    fn packer(blocks: &mut [Self], first: u32) -> Packer<'_>;
+
+    /// The blocks that a packer has begun.
+    fn used(packer: &Packer) -> usize;
+}
+
+impl Packed for TriangleBlock {
+    const LEAST: usize = TRIANGLES_AT_LEAST;
+
+    fn packer(blocks: &mut [Self], first: u32) -> Packer<'_> {
+        Packer::new(blocks, &mut [], first, 0)
+    }
+
+    fn used(packer: &Packer) -> usize {
+        packer.triangle_block_count()
+    }
+}
+
+impl Packed for SphereBlock {
+    const LEAST: usize = SPHERES;
+
+    fn packer(blocks: &mut [Self], first: u32) -> Packer<'_> {
+        Packer::new(&mut [], blocks, 0, first)
+    }
+
+    fn used(packer: &Packer) -> usize {
+        packer.sphere_block_count()
+    }
+}
+
+/// Packs primitives of one kind, whose ids begin at entry `first`; returns how many blocks they take.
+pub(super) fn pack<B: Packed>(
     source: Source,
     ids: &[u32],
-    blocks: &mut [TriangleBlock],
+    first: usize,
+    blocks: &mut [B],
     caller: &Caller,
 ) -> Option<usize> {
-    let mut jobs = parts(ids, 0, TRIANGLES_AT_LEAST, blocks, caller)?;
+    let mut jobs = parts(ids, first, blocks, caller)?;
     caller.for_each(&mut jobs, |job| {
         if let Some(part) = job {
             part.used = part.pack(source);
@@ -46,35 +83,17 @@ pub(super) fn pack_triangles(
     })
 }
 
-/// Packs spheres, whose ids begin at entry `first`; all blocks are full but those that end a chunk.
-pub(super) fn pack_spheres(
-    source: Source,
-    ids: &[u32],
-    first: usize,
-    blocks: &mut [SphereBlock],
-    caller: &Caller,
-) -> Option<()> {
-    let mut jobs = parts(ids, first, SPHERES, blocks, caller)?;
-    caller.for_each(&mut jobs, |job| {
-        if let Some(part) = job {
-            part.used = part.pack(source);
-        }
-    });
-    jobs.iter().flatten().try_for_each(|part| part.used.map(|_| ()))
-}
-
 /// The ids in parts, each with the blocks that it can take.
-fn parts<'p, B>(
+fn parts<'p, B: Packed>(
     ids: &'p [u32],
     first: usize,
-    least: usize,
     mut blocks: &'p mut [B],
     caller: &Caller,
 ) -> Option<[Option<Part<'p, B>>; PARTS]> {
     let (mut jobs, mut at) = ([const { None }; PARTS], 0);
     let size = caller.part_size(ids.len(), CHUNK);
     for (i, (job, ids)) in jobs.iter_mut().zip(ids.chunks(size)).enumerate() {
-        let count = most_blocks(ids.len(), least);
+        let count = most_blocks(ids.len(), B::LEAST);
         let blocks = front(&mut blocks, count)?;
         *job = Some(Part { first: first + i * size, ids, blocks, at, used: None });
         at += count;
@@ -82,32 +101,17 @@ fn parts<'p, B>(
     Some(jobs)
 }
 
-impl Part<'_, TriangleBlock> {
+impl<B: Packed> Part<'_, B> {
     fn pack(&mut self, source: Source) -> Option<usize> {
         let (mut used, mut shapes) = (0, source.shapes());
         for (i, ids) in self.ids.chunks(CHUNK).enumerate() {
-            let first = (self.first + i * CHUNK) as u32;
-            let mut packer = Packer::new(self.blocks.get_mut(used..)?, &mut [], first, 0);
+            let mut packer =
+                B::packer(self.blocks.get_mut(used..)?, (self.first + i * CHUNK) as u32);
             for (i, id) in ids.iter().enumerate() {
                 shapes.look_ahead(|ahead| ids.get(i + ahead).copied());
                 packer.push(&shapes.get(*id)?)?;
             }
-            used += packer.triangle_block_count();
-        }
-        Some(used)
-    }
-}
-
-impl Part<'_, SphereBlock> {
-    fn pack(&mut self, source: Source) -> Option<usize> {
-        let (mut used, mut shapes) = (0, source.shapes());
-        for (i, ids) in self.ids.chunks(CHUNK).enumerate() {
-            let first = (self.first + i * CHUNK) as u32;
-            let mut packer = Packer::new(&mut [], self.blocks.get_mut(used..)?, 0, first);
-            for id in ids {
-                packer.push(&shapes.get(*id)?)?;
-            }
-            used += ids.len().div_ceil(SPHERES);
+            used += B::used(&packer);
         }
         Some(used)
     }
