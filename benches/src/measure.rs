@@ -80,9 +80,21 @@ pub fn measure(
     options: &Options,
     watch: &mut Watch,
 ) -> Result<SceneResult> {
+    let lineup = Lineup::build(&scene.model, options, case.fixed_cost)?;
+    let result = measure_lineup(&case.name, scene, lineup, options, watch)?;
+    Ok(SceneResult { fixed_cost: case.fixed_cost, ..result })
+}
+
+/// Traces and checks everything of a lineup.
+pub fn measure_lineup(
+    name: &str,
+    scene: &Loaded,
+    lineup: Lineup,
+    options: &Options,
+    watch: &mut Watch,
+) -> Result<SceneResult> {
     let reference = ours::bvh(&scene.model, Layout::Automatic)?;
     let list = ours::list(&scene.model)?;
-    let lineup = Lineup::build(&scene.model, options, case.fixed_cost)?;
     let accel = reference.accel();
     let maker = RayMaker::new(scene, &accel, options.ray_count());
     let mut kinds = Vec::new();
@@ -93,8 +105,8 @@ pub fn measure(
         kinds.push(measure_kind(&lineup.subjects, &accel, kind, (&rays, &right), options, watch)?);
     }
     Ok(SceneResult {
-        name: case.name.clone(),
-        fixed_cost: case.fixed_cost,
+        name: name.to_string(),
+        fixed_cost: false,
         count: scene.model.triangle_count(),
         unit: "triangle",
         structures: lineup.structures,
