@@ -7,14 +7,14 @@ use crate::prim::{for_each_counted, for_each_prim_in};
 use crate::scene::Scene;
 use glam::DVec3;
 
-/// Below this many rays for each primitive a uniform grid saves more time while it is built than its rays lose, if no list is
-/// long and primitives are compact.
+/// Below this many rays for each primitive a uniform grid saves more time while it is built than its rays lose, if lists are short and
+/// primitives are compact.
 const FEW_RAYS: f32 = 0.5;
 /// The same where they are in order, as trees are built faster then.
-const FEW_IN_ORDER: f32 = 0.08;
+const FEW_IN_ORDER: f32 = 0.12;
 
-/// A list is long with more primitives than this in one cell.
-const LONG: u32 = 1000;
+/// Lists are short if so many primitives at most are in the longest, times the rays for each primitive: for what a ray may have to test.
+const SHORT: f32 = 285.0;
 
 /// Primitives are compact if the box of one lies in up to this many cells on average.
 const COMPACT: f64 = 4.0;
@@ -30,12 +30,12 @@ pub(crate) fn suits_grid(scene: &Scene, census: &Census, rays_per_prim: f32) -> 
     }
     let Spread { longest, cells, in_order } = Spread::of(scene, census);
     let order_allows = rays_per_prim < FEW_IN_ORDER || in_order < IN_ORDER;
-    longest <= LONG && cells <= COMPACT && order_allows
+    longest as f32 * rays_per_prim <= SHORT && cells <= COMPACT && order_allows
 }
 
 /// How primitives lie in the box around them, in a grid with as many cells along each axis as the cube root of their number.
 struct Spread {
-    /// The longest list of centres that one of a sample is in.
+    /// How many centres are in the fullest cell in which one of a sample is.
     longest: u32,
     /// The cells in which the box of one lies on average.
     cells: f64,
@@ -98,7 +98,7 @@ impl Grid {
     }
 }
 
-/// So many primitives are a sample: in what cells are fuller than that share of a scene is nearly surely one of them.
+/// So many primitives are a sample: one of them is likely to be where there is a hundredth of all in one cell.
 const SAMPLES: u64 = 128;
 const SLOTS: usize = 256;
 

@@ -350,7 +350,7 @@ fn the_choice_follows_the_rays_and_the_scene() {
     }
     assert_eq!(kind_of(&surface, 0.05), Kind::Grid);
     assert_eq!((kind_of(&surface, 0.3), kind_of(&mixed, 0.3)), (Kind::Bvh, Kind::Grid));
-    assert_eq!((kind_of(&mixed, 0.6), kind_of(&stadium, 0.05)), (Kind::Bvh, Kind::Bvh));
+    assert_eq!((kind_of(&mixed, 0.6), kind_of(&stadium, 0.08)), (Kind::Bvh, Kind::Bvh));
     assert_eq!(kind_of(&hair, 0.05), Kind::Bvh);
     assert_eq!(kind_of(&handful, 0.05), Kind::List);
 }

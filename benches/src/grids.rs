@@ -109,14 +109,15 @@ fn regret(result: &SceneResult, model: &Model) -> Result<Vec<(Chosen, f64)>> {
     RAYS_PER_PRIM.into_iter().map(of).collect()
 }
 
-/// The seconds to build a structure, for each primitive, and those of a ray, the geometric mean of all kinds; what was too slow to
-/// be measured takes for ever.
+/// The seconds to build a structure, for each primitive, and those of a ray, the geometric mean of all kinds, by a sample where it was
+/// too slow to be measured.
 fn cost(result: &SceneResult, name: &str) -> [f64; 2] {
     let structure = result.structures.iter().find(|structure| structure.name == name);
     let subject = result.subjects.iter().position(|(subject, _)| subject == name);
     let seconds = |kind: &KindResult| {
-        let median = subject.and_then(|i| kind.methods[i].median_seconds());
-        (median.unwrap_or(f64::INFINITY) / kind.rays as f64).ln()
+        let method = subject.map(|i| &kind.methods[i]);
+        let measured = method.map(|method| method.median_seconds().unwrap_or(method.by_sample));
+        (measured.unwrap_or(f64::INFINITY) / kind.rays as f64).ln()
     };
     let mean = result.kinds.iter().map(seconds).sum::<f64>() / result.kinds.len() as f64;
     let build = structure.map_or(f64::INFINITY, |s| s.seconds) / result.count.max(1) as f64;

@@ -50,6 +50,8 @@ pub struct KindResult {
 pub struct MethodResult {
     /// The cost of each run; empty when the method was too slow to be measured.
     pub runs: Vec<Cost>,
+    /// The seconds of all rays by those of a sample: roughly right, and known of slow methods too.
+    pub by_sample: f64,
     /// Answers that differ from ours.
     pub differing: usize,
 }
@@ -201,7 +203,8 @@ fn take_turns(
                 answers.differing(right, subject.class.is_exact())
             }
         };
-        results.push((slow, MethodResult { runs: Vec::new(), differing }));
+        let by_sample = cost.seconds * rays.len() as f64 / sample.len().max(1) as f64;
+        results.push((slow, MethodResult { runs: Vec::new(), by_sample, differing }));
     }
     for run in 0..options.run_count() {
         for turn in 0..subjects.len() {
