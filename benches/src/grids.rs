@@ -9,7 +9,7 @@ use raykern::{BuildOptions, GridKind, GridOptions, Kind as Chosen, Layout, Owned
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::render::RenderScene;
-use raykern_harness::scenes as made;
+use raykern_harness::scenes::{self as made, SceneMaker};
 
 use crate::lineup::{Class, Lineup};
 use crate::measure::{KindResult, SceneResult, measure_lineup};
@@ -26,7 +26,7 @@ const FILES: [(&str, &str); 3] = [
     ("marching_dragons", "metu/marching_dragons.xml"),
 ];
 /// The same made in code, and others.
-const MADE: [(&str, fn() -> RenderScene); 4] =
+const MADE: [(&str, SceneMaker); 4] =
     [("hall", made::stadium), ("marching", made::marching), ("tubes", tubes), ("sizes", sizes)];
 /// What is left out unless it is named: these take minutes.
 const LARGE: [&str; 2] = ["cave", "marching_dragons"];
@@ -37,18 +37,19 @@ const RAYS_PER_PRIM: [f32; 10] = [0.01, 0.03, 0.06, 0.1, 0.2, 0.4, 1.0, 3.0, 10.
 /// Measures every scene; prints the regrets, and returns the rest.
 pub fn run(options: &Options, watch: &mut Watch) -> Result<Vec<SceneResult>> {
     let (mut results, mut regrets) = (Vec::new(), Vec::new());
-    let mut each = |name: &str, scene: Result<Loaded, String>| -> Result<()> {
-        let scene = match scene {
-            Ok(scene) => scene,
-            Err(reason) => return Ok(println!("{name}: skipped: {reason}\n")),
-        };
-        let lineup = lineup(&scene.model)?;
-        let result = measure_lineup(name, &scene, lineup, options, watch);
-        let result = result.context(name.to_string())?;
-        report::scene(&result);
-        regrets.push((name.to_string(), regret(&result, &scene.model)?));
-        results.push(result);
-        Ok(())
+    let mut each = |name: &str, scene: Result<Loaded, String>| {
+        match scene {
+            Ok(scene) => {
+                let lineup = lineup(&scene.model)?;
+                let result = measure_lineup(name, &scene, lineup, options, watch);
+                let result = result.context(name.to_string())?;
+                report::scene(&result);
+                regrets.push((name.to_string(), regret(&result, &scene.model)?));
+                results.push(result);
+            }
+            Err(reason) => println!("{name}: skipped: {reason}\n"),
+        }
+        anyhow::Ok(())
     };
     let wanted = |name: &str| options.names_scene(name).unwrap_or(!LARGE.contains(&name));
     for case in scenes::cases(options).iter().filter(|case| !case.fixed_cost && wanted(&case.name))
@@ -143,7 +144,7 @@ fn print_regrets(regrets: &[(String, Vec<(Chosen, f64)>)]) {
 }
 
 /// 1,500 tubes of 24 sides, 1 to 6 hundredths thick and 0.4 to 4 long, a third of them askew: 72,000 triangles.
-pub fn tubes() -> RenderScene {
+fn tubes() -> RenderScene {
     const SIDES: u32 = 24;
     let mut random = Random::new(11);
     let mut mesh = TriangleMesh::default();
@@ -170,7 +171,7 @@ pub fn tubes() -> RenderScene {
 }
 
 /// 103 balls of 1,000 to 40,000 triangles on a floor, in sizes of 1 to 1/1000.
-pub fn sizes() -> RenderScene {
+fn sizes() -> RenderScene {
     let mut random = Random::new(12);
     let mut mesh = make::plane(20_000).placed(8.0, [-4.0, -4.0, 0.0]);
     for i in 0..103 {
