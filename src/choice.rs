@@ -3,61 +3,138 @@
 use crate::block::Census;
 use crate::math::float::cube_root;
 use crate::math::wide;
-use crate::prim::for_each_counted;
+use crate::prim::{for_each_counted, for_each_prim_in};
 use crate::scene::Scene;
+use glam::DVec3;
 
-/// Below this many rays for each primitive a uniform grid saves more time while it is built than its rays lose, if the
-/// scene is even and its primitives are compact.
-const FEW_RAYS: f32 = 0.08;
+/// Below this many rays for each primitive a uniform grid saves more time while it is built than its rays lose, if lists are short and
+/// primitives are compact.
+const FEW_RAYS: f32 = 0.5;
+/// The same where they are in order, as trees are built faster then.
+const FEW_IN_ORDER: f32 = 0.12;
 
-/// A scene is even if a primitive has up to this many times as many others in its part of space as it would if all were spread over
-/// the whole box.
-const EVEN: f64 = 16.0;
+/// Lists are short if so many primitives at most are in the longest, times the rays for each primitive: for what a ray may have to test.
+const SHORT: f32 = 285.0;
 
 /// Primitives are compact if the box of one lies in up to this many cells on average.
-const COMPACT: f64 = 3.0;
+const COMPACT: f64 = 4.0;
 
-/// Parts of the box along each axis.
-const PARTS: usize = 8;
+/// Primitives are in order if this share of them is near the one before: along each axis by this part of the box.
+const IN_ORDER: f64 = 0.95;
+const NEAR: f64 = 1.0 / 32.0;
 
 /// Whether a uniform grid is likely to take less time than a BVH, with so many rays for each primitive until it is built again.
 pub(crate) fn suits_grid(scene: &Scene, census: &Census, rays_per_prim: f32) -> bool {
     if !(0.0 < rays_per_prim && rays_per_prim < FEW_RAYS) {
         return false;
     }
-    let Spread { unevenness, cells } = Spread::of(scene, census);
-    unevenness <= EVEN && cells <= COMPACT
+    let Spread { longest, cells, in_order } = Spread::of(scene, census);
+    let order_allows = rays_per_prim < FEW_IN_ORDER || in_order < IN_ORDER;
+    longest as f32 * rays_per_prim <= SHORT && cells <= COMPACT && order_allows
 }
 
-/// How primitives lie in the box around them.
+/// How primitives lie in the box around them, in a grid with as many cells along each axis as the cube root of their number.
 struct Spread {
-    /// How many primitives share a part of space with one of them on average, over how many would if they were spread evenly.
-    unevenness: f64,
-    /// The cells in which the box of one lies on average, if there are as many along each axis as the cube root of their number.
+    /// How many centres are in the fullest cell in which one of a sample is.
+    longest: u32,
+    /// The cells in which the box of one lies on average.
     cells: f64,
+    /// The share of them that is near the one before.
+    in_order: f64,
 }
 
 impl Spread {
     fn of(scene: &Scene, census: &Census) -> Spread {
-        let (mut counts, mut cells) = ([0u32; PARTS * PARTS * PARTS], 0.0);
-        let lower = wide(census.bounds.lower);
-        let extent = wide(census.bounds.upper) - lower;
-        let per_part = PARTS as f64 / extent;
-        let all = f64::from(census.hittable());
-        let per_cell = cube_root(all) / extent;
+        let grid = Grid::over(census);
+        let mut lists = Lists::NONE;
+        for i in 0..SAMPLES {
+            let id = (u64::from(census.prim_limit) * i / SAMPLES) as u32;
+            for_each_prim_in(scene, id..id + 1, false, |prim| {
+                let aabb = prim.shape.aabb();
+                lists.begin(grid.cell(wide(aabb.lower), wide(aabb.upper)));
+            });
+        }
+        let (mut cells, mut near, mut before) = (0.0, 0u32, DVec3::INFINITY);
         for_each_counted(scene, census, |prim| {
             let aabb = prim.shape.aabb();
             let (from, to) = (wide(aabb.lower), wide(aabb.upper));
-            let centre = (from + to) / 2.0;
+            lists.count(grid.cell(from, to));
             // Not NaN, as in a flat axis.
-            let sides = ((to - from) * per_cell).to_array().map(|cells| 1.0 + cells.max(0.0));
+            let sides = ((to - from) * grid.per_length).to_array().map(|side| 1.0 + side.max(0.0));
             cells += sides[0] * sides[1] * sides[2];
-            // The casts saturate, and NaN goes to 0.
-            let [i, j, k] =
-                ((centre - lower) * per_part).to_array().map(|x| (x as usize).min(PARTS - 1));
-            counts[i + PARTS * (j + PARTS * k)] += 1;
+            let moved = (from - before).abs();
+            near += u32::from(!moved.cmpgt(grid.near).any());
+            before = from;
         });
-        let squares: f64 = counts.iter().map(|n| f64::from(*n) * f64::from(*n)).sum();
-        Spread { unevenness: squares * counts.len() as f64 / (all * all), cells: cells / all }
+        let all = f64::from(census.hittable());
+        Spread { longest: lists.longest(), cells: cells / all, in_order: f64::from(near) / all }
+    }
+}
+
+/// Where cells lie.
+struct Grid {
+    lower: DVec3,
+    per_length: DVec3,
+    /// How many there are along each axis.
+    count: u32,
+    /// How far apart what is near may be.
+    near: DVec3,
+}
+
+impl Grid {
+    fn over(census: &Census) -> Grid {
+        let lower = wide(census.bounds.lower);
+        let extent = wide(census.bounds.upper) - lower;
+        let count = cube_root(f64::from(census.hittable()));
+        Grid { lower, per_length: count / extent, count: 1 + count as u32, near: extent * NEAR }
+    }
+
+    /// The cell of the centre of a box.
+    fn cell(&self, from: DVec3, to: DVec3) -> u32 {
+        let centre = ((from + to) / 2.0 - self.lower) * self.per_length;
+        // The casts saturate, and NaN, as in a flat axis, goes to 0.
+        let [i, j, k] = centre.to_array().map(|x| (x as u32).min(self.count - 1));
+        i + self.count * (j + self.count * k)
+    }
+}
+
+/// So many primitives are a sample: one of them is likely to be where there is a hundredth of all in one cell.
+const SAMPLES: u64 = 128;
+const SLOTS: usize = 256;
+
+/// No cell: there are fewer.
+const NOWHERE: u32 = u32::MAX;
+
+/// How many centres are in some cells, which are found by a hash; half of the slots at most are in use.
+struct Lists {
+    cells: [u32; SLOTS],
+    counts: [u32; SLOTS],
+}
+
+impl Lists {
+    const NONE: Self = Lists { cells: [NOWHERE; SLOTS], counts: [0; SLOTS] };
+
+    /// The slot of a cell, or where it would be.
+    fn slot(&self, cell: u32) -> usize {
+        // The upper bits of the golden ratio's multiples are spread well.
+        let mut slot = (cell.wrapping_mul(0x9E37_79B9) >> 24) as usize;
+        while self.cells[slot % SLOTS] != cell && self.cells[slot % SLOTS] != NOWHERE {
+            slot += 1;
+        }
+        slot % SLOTS
+    }
+
+    /// Counts what is in this cell from now on.
+    fn begin(&mut self, cell: u32) {
+        self.cells[self.slot(cell)] = cell;
+    }
+
+    fn count(&mut self, cell: u32) {
+        let slot = self.slot(cell);
+        self.counts[slot] += u32::from(self.cells[slot] == cell);
+    }
+
+    fn longest(&self) -> u32 {
+        self.counts.iter().fold(0, |longest, count| longest.max(*count))
     }
 }

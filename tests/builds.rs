@@ -323,12 +323,17 @@ fn memory_of_a_cancelled_build_may_be_used_again() {
     });
 }
 
-/// A BVH where rays are many, the scene uneven or its triangles long, a grid where rays are few, a list for a handful.
+/// A BVH where rays are many, the scene uneven or its triangles long, a grid where rays are few, and with more rays only where triangles are
+/// in no order; a list for a handful.
 #[test]
 fn the_choice_follows_the_rays_and_the_scene() {
     let surface: Model = make::plane(5_000).into();
     let handful: Model = make::plane(8).into();
     let hair: Model = make::hair(300_000, 1).into();
+    let mut mixed = surface.clone();
+    let count = mixed.meshes[0].indices.len();
+    mixed.meshes[0].indices =
+        (0..count).map(|i| surface.meshes[0].indices[i * 1009 % count]).collect();
     let mut stadium = surface.clone();
     stadium.meshes.push(make::plane(50).placed(1e3, [-5e2, -5e2, -1.0]));
     let kind_of = |model: &Model, rays_per_prim: f32| {
@@ -344,7 +349,8 @@ fn the_choice_follows_the_rays_and_the_scene() {
         assert_eq!(kind_of(&surface, rays), Kind::Bvh, "{rays}");
     }
     assert_eq!(kind_of(&surface, 0.05), Kind::Grid);
-    assert_eq!(kind_of(&stadium, 0.05), Kind::Bvh);
+    assert_eq!((kind_of(&surface, 0.3), kind_of(&mixed, 0.3)), (Kind::Bvh, Kind::Grid));
+    assert_eq!((kind_of(&mixed, 0.6), kind_of(&stadium, 0.08)), (Kind::Bvh, Kind::Bvh));
     assert_eq!(kind_of(&hair, 0.05), Kind::Bvh);
     assert_eq!(kind_of(&handful, 0.05), Kind::List);
 }

@@ -6,6 +6,7 @@ pub mod check;
 pub mod embree;
 #[cfg(feature = "embree")]
 pub mod embree4;
+pub mod grids;
 pub mod instances;
 pub mod lineup;
 pub mod measure;

@@ -31,7 +31,9 @@ pub enum Class {
     Fast,
     /// Our BVH of the quality best, one ray at a time.
     Best,
-    /// Our grid, one ray at a time.
+    /// Our binary BVH, one ray at a time: with what grids are compared.
+    Compact,
+    /// Our grid.
     Grid(Precision),
     /// Our C face.
     Face,
@@ -64,6 +66,7 @@ impl Class {
                 | Class::Batch(_)
                 | Class::Fast
                 | Class::Best
+                | Class::Compact
                 | Class::Grid(_)
                 | Class::Face
                 | Class::Noise

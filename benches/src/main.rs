@@ -8,7 +8,7 @@ use clap::Parser;
 
 use raykern_bench::options::Options;
 use raykern_bench::watch::Watch;
-use raykern_bench::{instances, measure, motion, points, ratios, report, scenes, watch};
+use raykern_bench::{grids, instances, measure, motion, points, ratios, report, scenes, watch};
 
 fn main() -> Result<()> {
     let options = Options::parse();
@@ -28,6 +28,11 @@ fn main() -> Result<()> {
     }
     if options.instances {
         let results = instances::run(&options, &mut watch)?;
+        ratios::print(&results);
+        return Ok(());
+    }
+    if options.grids {
+        let results = grids::run(&options, &mut watch)?;
         ratios::print(&results);
         return Ok(());
     }

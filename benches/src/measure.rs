@@ -50,6 +50,8 @@ pub struct KindResult {
 pub struct MethodResult {
     /// The cost of each run; empty when the method was too slow to be measured.
     pub runs: Vec<Cost>,
+    /// The seconds of all rays by those of a sample: roughly right, and known of slow methods too.
+    pub by_sample: f64,
     /// Answers that differ from ours.
     pub differing: usize,
 }
@@ -80,9 +82,21 @@ pub fn measure(
     options: &Options,
     watch: &mut Watch,
 ) -> Result<SceneResult> {
+    let lineup = Lineup::build(&scene.model, options, case.fixed_cost)?;
+    let result = measure_lineup(&case.name, scene, lineup, options, watch)?;
+    Ok(SceneResult { fixed_cost: case.fixed_cost, ..result })
+}
+
+/// Traces and checks everything of a lineup.
+pub fn measure_lineup(
+    name: &str,
+    scene: &Loaded,
+    lineup: Lineup,
+    options: &Options,
+    watch: &mut Watch,
+) -> Result<SceneResult> {
     let reference = ours::bvh(&scene.model, Layout::Automatic)?;
     let list = ours::list(&scene.model)?;
-    let lineup = Lineup::build(&scene.model, options, case.fixed_cost)?;
     let accel = reference.accel();
     let maker = RayMaker::new(scene, &accel, options.ray_count());
     let mut kinds = Vec::new();
@@ -93,8 +107,8 @@ pub fn measure(
         kinds.push(measure_kind(&lineup.subjects, &accel, kind, (&rays, &right), options, watch)?);
     }
     Ok(SceneResult {
-        name: case.name.clone(),
-        fixed_cost: case.fixed_cost,
+        name: name.to_string(),
+        fixed_cost: false,
         count: scene.model.triangle_count(),
         unit: "triangle",
         structures: lineup.structures,
@@ -189,7 +203,8 @@ fn take_turns(
                 answers.differing(right, subject.class.is_exact())
             }
         };
-        results.push((slow, MethodResult { runs: Vec::new(), differing }));
+        let by_sample = cost.seconds * rays.len() as f64 / sample.len().max(1) as f64;
+        results.push((slow, MethodResult { runs: Vec::new(), by_sample, differing }));
     }
     for run in 0..options.run_count() {
         for turn in 0..subjects.len() {

@@ -47,6 +47,9 @@ pub struct Options {
     /// Instead of still scenes: one model many times, by instances.
     #[arg(long)]
     pub instances: bool,
+    /// Instead of the peers: grids against BVHs, also in scenes of mixed sizes, and what the choice between them costs.
+    #[arg(long)]
+    pub grids: bool,
     /// Instead of rays: the closest point of a scene, for many points.
     #[arg(long)]
     pub points: bool,

@@ -129,7 +129,7 @@ pub fn each<A>(rays: &[Ray], answers: &mut [A], ask: impl Fn(&Ray) -> A) {
 }
 
 /// One call for all rays.
-struct Batch(Rc<OwnedAccel<'static>>);
+pub struct Batch(pub Rc<OwnedAccel<'static>>);
 
 impl Tracer for Batch {
     fn closest(&self, rays: &[Ray], hits: &mut [Hit], _coherent: bool, watch: &mut Watch) {

@@ -19,7 +19,7 @@ const WATERTIGHT: Class = Class::Single(Precision::Watertight);
 const BATCH: Class = Class::Batch(Precision::Exact);
 
 /// Of several devices or forms the fastest counts, for each scene and kind of ray anew.
-const MATCHES: [Match; 16] = [
+const MATCHES: [Match; 17] = [
     Match { ours: EXACT, against: "itself (the noise)", peers: &[Class::Noise] },
     Match { ours: EXACT, against: "embree", peers: &[Class::Embree] },
     Match { ours: EXACT, against: "embree robust", peers: &[Class::EmbreeRobust] },
@@ -46,6 +46,11 @@ const MATCHES: [Match; 16] = [
     Match { ours: Class::Fast, against: "embree low", peers: &[Class::EmbreeLow] },
     Match { ours: Class::Best, against: "our bvh", peers: &[EXACT] },
     Match { ours: Class::Best, against: "embree high", peers: &[Class::EmbreeHigh] },
+    Match {
+        ours: Class::Grid(Precision::Exact),
+        against: "our binary bvh",
+        peers: &[Class::Compact],
+    },
     Match { ours: Class::Grid(Precision::Exact), against: "our bvh", peers: &[EXACT] },
     Match { ours: Class::Grid(Precision::Exact), against: "embree", peers: &[Class::Embree] },
 ];

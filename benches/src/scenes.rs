@@ -139,7 +139,8 @@ fn read_file(file: &str, options: &Options) -> Result<RenderScene, String> {
     load(&folder.join(file)).map_err(|error| error.to_string())
 }
 
-fn prepared(mut scene: RenderScene, view: View) -> Result<Loaded, String> {
+/// A scene as it is measured: triangles alone.
+pub fn prepared(mut scene: RenderScene, view: View) -> Result<Loaded, String> {
     let mut model = scene.model.flattened().ok_or("has ellipsoids")?;
     model.sphere_sets.clear();
     let camera = scene.cameras.swap_remove(0);
