@@ -82,6 +82,7 @@ mod math;
 #[cfg(feature = "alloc")]
 mod owned;
 mod pack;
+mod pending;
 mod point;
 mod prim;
 mod query;

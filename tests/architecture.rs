@@ -11,13 +11,14 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("math", &[]),
     ("error", &[]),
     ("storage", &[]),
+    ("pending", &[]),
     ("simd", &["math"]),
     ("caller", &["kinds"]),
     ("exact", &["kinds", "math"]),
     ("ray", &["exact", "math", "simd"]),
     ("block", &["error", "kinds", "math", "storage"]),
     ("scene", &["block", "math"]),
-    ("instance", &["block", "error", "exact", "math", "ray", "scene"]),
+    ("instance", &["block", "error", "exact", "math", "ray", "scene", "simd"]),
     ("interval", &["exact", "math", "simd"]),
     // The tests of its bounds judge by `interval` and `exact`.
     ("sieve", &["block", "exact", "interval", "math", "ray", "simd"]),
@@ -35,15 +36,15 @@ const HOUSE: &[(&str, &[&str])] = &[
     (
         "grid",
         &[
-            "block", "caller", "error", "math", "point", "prim", "query", "ray", "scene", "simd",
-            "storage",
+            "block", "caller", "error", "math", "pending", "point", "prim", "query", "ray",
+            "scene", "simd", "storage",
         ],
     ),
     (
         "bvh",
         &[
-            "block", "caller", "error", "kinds", "math", "point", "prim", "query", "ray", "scene",
-            "simd", "storage",
+            "block", "caller", "error", "kinds", "math", "pending", "point", "prim", "query",
+            "ray", "scene", "simd", "storage",
         ],
     ),
     ("surface", &["exact", "instance", "interval", "math"]),

@@ -140,6 +140,16 @@ pub(crate) const MOST_CELLS: u32 = 1023;
 /// The sides of empty cubes that a word can name, in cells.
 pub(crate) const SIDES: [u8; 8] = [1, 2, 3, 4, 6, 8, 12, 16];
 
+/// How many cells such cubes reach beyond their first.
+pub(crate) const AHEAD: [f32; 8] = {
+    let (mut ahead, mut i) = ([0.0; 8], 0);
+    while i < 8 {
+        ahead[i] = SIDES[i] as f32 - 1.0;
+        i += 1;
+    }
+    ahead
+};
+
 /// What a cell's word says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Cell {

@@ -15,6 +15,7 @@
 )]
 
 use super::Finished;
+use super::view::At;
 use crate::error::OpenError;
 use crate::math::Aabb;
 use crate::storage::{self, ALIGNMENT, Plain, align_up};
@@ -46,26 +47,27 @@ unsafe impl Plain for LevelHead {}
 /// One instance.
 ///
 /// ```text
-/// byte 0                 72                120      144     148    152        160
-///      | world to object | object to world | bounds | child | mask | reserved |
+/// byte 0                 72     80      84     88                136      160
+///      | world to object | zero | child | mask | object to world | bounds |
 /// ```
+///
+/// What a ray needs comes first.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(8))]
 pub(crate) struct InstanceRecord {
-    /// The inverse of the linear part of the map, in rows.
-    pub world_to_object: [[f64; 3]; 3],
+    /// The inverse of the linear part of the map, column after column, and a zero, so that each may be read as four.
+    pub world_to_object: [f64; 10],
+    /// Which of the children.
+    pub child: u32,
+    pub mask: u32,
     /// Three rows of four; the last column is the shift.
     pub object_to_world: [f32; 12],
     /// The box in the index; empty if there is nothing in it.
     pub bounds: Aabb,
-    /// Which of the children.
-    pub child: u32,
-    pub mask: u32,
-    pub reserved: [u32; 2],
 }
 const _: () = assert!(size_of::<InstanceRecord>() == 160);
 
-// SAFETY: numbers only; 72 + 48 + 24 + 4 + 4 + 8 = 160, so no padding.
+// SAFETY: numbers only; 80 + 4 + 4 + 48 + 24 = 160, so no padding.
 unsafe impl Plain for InstanceRecord {}
 
 /// Where the parts behind the own primitives start, in bytes from the front of the block.
@@ -140,12 +142,22 @@ impl<'m> Level<'m> {
     }
 
     /// The same for a block that was found right before.
+    ///
+    /// Nothing is checked again: one ray begins here.
+    #[allow(clippy::multiple_unsafe_ops_per_block, reason = "one proof covers all parts")]
+    #[inline(always)]
     pub(super) fn of(whole: Finished<'m>, own: usize) -> Option<Self> {
-        // SAFETY: where the index belongs in such a block it is, and whole.
-        Self::with_index(whole, own, |bytes: &[u8]| unsafe { Finished::known(bytes.as_ptr()) })
+        let block = whole.bytes().as_ptr();
+        let mut at = At::new(block, own);
+        // SAFETY: in such a block the parts follow each other in this order, and the index is whole.
+        unsafe {
+            let head: &LevelHead = at.part(1).first()?;
+            let (instances, children) = (at.part(head.instance_count), at.part(head.child_count));
+            let index = Finished::known(at.place())?;
+            Some(Level { whole, head, instances, children, index })
+        }
     }
 
-    #[inline(always)]
     fn with_index(
         whole: Finished<'m>,
         own: usize,

@@ -36,7 +36,7 @@ use crate::storage::{self, ALIGNMENT, Plain, align_up};
 const MAGIC: [u8; 8] = *b"raykern\0";
 const BYTE_ORDER: u32 = 0x0102_0304;
 /// Counted up whenever the bytes of a block change their meaning.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 
 pub(crate) const KIND_LIST: u32 = 1;
 pub(crate) const KIND_GRID: u32 = 2;

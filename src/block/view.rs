@@ -133,7 +133,7 @@ impl<'m> Finished<'m> {
             // What this build does not know no block has that it opens.
             let [grids, words, runs] = [grids, words, runs].map(|n| if GRID { n } else { 0 });
             let sphere_blocks = if BALLS { sphere_blocks } else { 0 };
-            let mut at = At { block, offset: size_of::<Header>() };
+            let mut at = At::new(block, size_of::<Header>());
             let (geometries, prim_ids) = (at.part(geometries), at.part(prim_ids));
             let (grids, nodes) = (at.part(grids), at.part(nodes));
             let bundles = match header.layout {
@@ -210,21 +210,38 @@ fn is_known(header: &Header) -> bool {
 }
 
 /// The way through the parts of a finished block.
-struct At {
+pub(super) struct At {
     block: *const u8,
     offset: usize,
 }
 
 impl At {
+    /// At byte `offset`.
+    #[inline(always)]
+    pub fn new(block: *const u8, offset: usize) -> Self {
+        At { block, offset }
+    }
+
+    /// Where what follows lies.
+    ///
+    /// # Safety
+    ///
+    /// That is within the block, or at its end.
+    #[inline(always)]
+    pub unsafe fn place(&self) -> *const u8 {
+        // SAFETY: the caller's promise.
+        unsafe { self.block.add(self.offset) }
+    }
+
     /// The next part, of `count` elements.
     ///
     /// # Safety
     ///
     /// The elements are there, and nobody writes to them during `'m`.
     #[inline(always)]
-    unsafe fn part<'m, T: storage::Plain>(&mut self, count: u32) -> &'m [T] {
+    pub unsafe fn part<'m, T: storage::Plain>(&mut self, count: u32) -> &'m [T] {
         // SAFETY: within the block, by the caller's promise.
-        let first = unsafe { self.block.add(self.offset) }.cast::<T>();
+        let first = unsafe { self.place() }.cast::<T>();
         // It ends within the block, so this does not overflow.
         let size = count as usize * size_of::<T>() + (ALIGNMENT - 1);
         self.offset += size & !(ALIGNMENT - 1);

@@ -56,7 +56,13 @@ impl Effort {
     /// of them, and where they are parted matters. `None` for scenes that are even enough.
     pub fn for_uneven(self, unevenness: f64) -> Option<Effort> {
         let uneven = Effort { bins: BINS, samples: ALL, one_axis: false, whole: false, ..self };
-        (unevenness > self.even).then_some(uneven)
+        (!self.is_even(unevenness)).then_some(uneven)
+    }
+
+    /// Whether so uneven refs need no more than others.
+    pub fn is_even(&self, unevenness: f64) -> bool {
+        // Refs without any area are.
+        !(unevenness > self.even)
     }
 }
 

@@ -1,17 +1,15 @@
 //! The tree as branches that grow independently, on any number of threads.
 
-use core::ops::Range;
-
 use super::MAX_DEPTH;
 use super::refs::PrimRef;
 use super::split::{Areas, Extent};
+use super::spread::part_size;
 use super::task::{Known, Task};
 use super::tree::{Grown, Limits, Splitter};
 use crate::block::BvhNode;
-use crate::caller::{Caller, PARTS};
+use crate::caller::Caller;
 use crate::kinds::{THREADS, WIDE};
 use crate::math::Aabb;
-use crate::prim::GRAIN;
 use crate::simd::SMALL;
 
 /// How much a tree has.
@@ -57,6 +55,7 @@ pub(crate) fn grow(
         room,
         depth: 0,
         budget,
+        even: false,
         known: Known::of(extent),
     };
     if THREADS {
@@ -176,7 +175,7 @@ impl Splitter<'_, '_, '_> {
     /// The box around what a task splits, and what it is split into.
     fn children(self, task: &Task, slots: &mut [PrimRef]) -> Option<(Aabb, [Task; 2])> {
         let refs = slots.get(..task.count)?;
-        let extent = task.known.extent(refs, self.step(refs));
+        let extent = task.known.extent(refs, self.step(refs, task.even));
         let split = self.part(slots, task, &extent, &mut self.scratch())?;
         Some((extent.bounds.aabb(), task.children(&split, task.pairs, slots)?))
     }
@@ -215,30 +214,6 @@ fn whole(refs: &[PrimRef], caller: &Caller) -> Option<Extent> {
         extent = extent.zip(part).map(|(extent, part)| extent.with(&part));
     });
     extent
-}
-
-/// How unlike the areas of refs are: 1 where all are alike, about `n / k` where `k` of `n` have most of the area.
-pub(super) fn unevenness(refs: &[PrimRef], areas: Areas, caller: &Caller) -> f64 {
-    let sums = |part: Range<usize>| {
-        let (mut sum, mut squares) = (0.0, 0.0);
-        for r in refs.get(part).unwrap_or_default() {
-            let area = f64::from(areas.of_finite(&r.bounds));
-            sum += area;
-            squares += area * area;
-        }
-        (sum, squares)
-    };
-    let (mut sum, mut squares) = (0.0, 0.0);
-    caller.for_parts(refs.len(), part_size(refs), sums, |part| {
-        sum += part.0;
-        squares += part.1;
-    });
-    squares * refs.len() as f64 / (sum * sum)
-}
-
-/// Parts that do not depend on the threads, as sums are rounded.
-fn part_size(refs: &[PrimRef]) -> usize {
-    refs.len().div_ceil(PARTS).max(GRAIN)
 }
 
 /// Gives nodes whose boxes were left open those of their children, which come after them.
@@ -316,13 +291,15 @@ mod tests {
             mixed: false,
             depth: Depth::Paying,
             effort,
+            even: None,
         };
         let (refs, caller) = (series(count, 1.001), Caller::new(None, None));
         let extent = Extent::around(&refs);
         let areas = Areas::new(&extent.bounds.aabb());
         let splitter = Splitter { limits: &limits, areas, whole: areas.of(&extent.bounds.aabb()) };
         let ([depth, budget], known) = ([0, leaves], Known::of(extent));
-        let root = Task { node: 0, pairs: 2, first: 0, count, room: count, depth, budget, known };
+        let (room, even) = (count, false);
+        let root = Task { node: 0, pairs: 2, first: 0, count, room, depth, budget, even, known };
         let tree = |apart: bool| {
             let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
             let mut refs = refs.clone();
@@ -354,7 +331,8 @@ mod tests {
         // Both choose planes of large nodes by samples.
         for effort in [Effort::FAST, Effort::BALANCED] {
             let (leaves, leaf_max, depth) = (count / 2, 4, Depth::Whole);
-            let limits = Limits { leaves, source: None, leaf_max, mixed: false, depth, effort };
+            let limits =
+                Limits { leaves, source: None, leaf_max, mixed: false, depth, effort, even: None };
             let size = grow(&mut nodes, &mut refs, count, &limits, &Caller::new(None, None));
             assert_eq!(size.map(|size| size.refs), Some(count));
             let (mut pending, mut first) = (std::vec![0], 0);

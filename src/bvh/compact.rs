@@ -2,10 +2,11 @@
 
 use super::How;
 use super::MAX_DEPTH;
-use super::branch::{grow, unevenness};
+use super::branch::grow;
 use super::budget::leaf_budget;
 use super::refs::{PrimRef, gather};
 use super::split::Areas;
+use super::spread::unevenness_of_all;
 use super::tree::{Depth, Grown, Limits};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
@@ -100,11 +101,18 @@ fn grow_tree(
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
     gather(scene, census, 1, how.caller, refs);
     let mixed = census.is_mixed();
-    let unevenness = unevenness(refs, Areas::new(&census.bounds), how.caller);
+    let unevenness = unevenness_of_all(refs, Areas::new(&census.bounds), how.caller);
     let effort = how.effort.for_uneven(unevenness).unwrap_or(how.effort);
     let leaves = plan.leaves;
-    let limits =
-        Limits { leaves, source: None, leaf_max: LEAF_MAX, mixed, depth: Depth::Paying, effort };
+    let limits = Limits {
+        leaves,
+        source: None,
+        leaf_max: LEAF_MAX,
+        mixed,
+        depth: Depth::Paying,
+        effort,
+        even: None,
+    };
     let node_count = grow(nodes, refs, plan.ref_count, &limits, how.caller)?.nodes;
     // Triangles first, then spheres, each in the order of the leaves.
     let mut ids = prim_ids.iter_mut();

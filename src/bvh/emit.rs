@@ -225,6 +225,7 @@ mod tests {
             mixed: false,
             depth: Depth::Deep,
             effort: Effort::BALANCED,
+            even: None,
         };
         let caller = &Caller::new(None, None);
         let size = grow(&mut nodes, &mut refs, LEAVES, &limits, caller);

@@ -19,6 +19,7 @@ mod search;
 mod shared;
 mod spatial;
 mod split;
+mod spread;
 mod stack;
 mod sweep;
 mod task;

@@ -266,6 +266,7 @@ mod tests {
             mixed: false,
             depth: Depth::Deep,
             effort: Effort::FAST,
+            even: None,
         };
         let caller = &Caller::new(None, None);
         let size = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");

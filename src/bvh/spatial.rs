@@ -268,6 +268,7 @@ mod tests {
             mixed: false,
             depth: Depth::Deep,
             effort: Effort::BEST,
+            even: None,
         };
         let caller = &Caller::new(None, None);
         let size = grow(&mut nodes, &mut slots, count, &limits, caller).expect("room");

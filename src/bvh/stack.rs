@@ -8,34 +8,8 @@ use super::MAX_DEPTH;
 use crate::block::bundle::ChildRef;
 use crate::simd::{Simd, Width};
 
-/// Nodes to come back to, or what stands for them. Those below `count` are written.
-pub(super) struct Pending<E> {
-    entries: [MaybeUninit<E>; MAX_DEPTH],
-    count: usize,
-}
-
-impl<E: Copy> Pending<E> {
-    #[inline(always)]
-    pub fn new() -> Self {
-        Pending { entries: [const { MaybeUninit::uninit() }; MAX_DEPTH], count: 0 }
-    }
-
-    /// False when there is no room.
-    #[inline(always)]
-    pub fn push(&mut self, new: E) -> bool {
-        let Some(entry) = self.entries.get_mut(self.count) else { return false };
-        entry.write(new);
-        self.count += 1;
-        true
-    }
-
-    #[inline(always)]
-    pub fn pop(&mut self) -> Option<E> {
-        self.count = self.count.checked_sub(1)?;
-        // SAFETY: a push wrote it, and counted it afterwards.
-        Some(unsafe { self.entries.get(self.count)?.assume_init() })
-    }
-}
+/// Nodes to come back to, or what stands for them.
+pub(super) type Pending<E> = crate::pending::Pending<E, MAX_DEPTH>;
 
 /// Room for a [`Stack`].
 pub(crate) struct Columns<const ROOM: usize> {

@@ -19,6 +19,8 @@ pub(super) struct Task {
     pub depth: usize,
     /// Leaves it may have.
     pub budget: usize,
+    /// Whether the areas of its refs are known to be alike.
+    pub even: bool,
     pub known: Known,
 }
 
@@ -26,6 +28,7 @@ pub(super) struct Task {
 pub(super) struct Split {
     pub counts: [usize; 2],
     pub least: [usize; 2],
+    pub even: [bool; 2],
     pub sides: [Known; 2],
 }
 
@@ -69,7 +72,7 @@ impl Task {
     const UNUSED: Task = {
         let zero = Extent { bounds: Box4::ZERO, centres: Box4::ZERO };
         let ([first, count, room], [depth, budget], known) = ([0; 3], [0; 2], Known([zero; KEPT]));
-        Task { node: 0, pairs: 0, first, count, room, depth, budget, known }
+        Task { node: 0, pairs: 0, first, count, room, depth, budget, even: false, known }
     };
 
     /// The tasks of the sides, whose nodes are the pair at `pair`. The right one's refs are moved behind
@@ -77,7 +80,7 @@ impl Task {
     pub fn children(&self, split: &Split, pair: u32, slots: &mut [PrimRef]) -> Option<[Task; 2]> {
         let depth = self.depth + 1;
         let ([count, right_count], budget) = (split.counts, share(self, split));
-        let [left, right] = split.sides;
+        let ([left, right], [even, right_even]) = (split.sides, split.even);
         let (first, pairs) = (self.first, pair + 2);
         // Each side has its part of the free slots.
         let free = self.room.checked_sub(count + right_count)?;
@@ -87,13 +90,13 @@ impl Task {
             slots.get(..room + right_count)?;
             slots.copy_within(count..count + right_count, room);
         }
-        let left = Task { node: pair, pairs, first, count, room, depth, budget, known: left };
+        let left = Task { node: pair, pairs, first, count, room, depth, budget, even, known: left };
         // A subtree has a pair for each of its leaves but one.
         let pairs = pairs + 2 * (budget as u32).saturating_sub(1);
         let (first, count, room) = (first + room, right_count, self.room - room);
         let budget = self.budget - budget;
-        let node = pair + 1;
-        Some([left, Task { node, pairs, first, count, room, depth, budget, known: right }])
+        let (node, even) = (pair + 1, right_even);
+        Some([left, Task { node, pairs, first, count, room, depth, budget, even, known: right }])
     }
 }
 

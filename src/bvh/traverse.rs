@@ -30,7 +30,7 @@ pub(crate) fn traverse<S: Simd, Q: Query>(
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    let mut stack = Pending::new();
+    let mut stack = Pending::NONE;
     let Some(mut node) = nodes.first() else { return false };
     query.watch().step();
     if slab.part(node.corners(), query.t_bound()).is_empty() {

@@ -6,7 +6,8 @@ use super::branch::Branch;
 use super::budget::{fewest_leaves, levels_to_halve};
 use super::refs::PrimRef;
 use super::spatial::{best_cut, overlap};
-use super::split::{Areas, Extent};
+use super::split::{Areas, Extent, greater};
+use super::spread::unevenness;
 use super::sweep::{FEW, sort_few, sweep};
 use super::task::{Known, Split, Task, Tasks};
 use crate::block::BvhNode;
@@ -56,6 +57,8 @@ pub(crate) struct Limits<'s, 'a> {
     pub depth: Depth,
     /// How carefully planes are chosen.
     pub effort: Effort,
+    /// The same for parts that turn out to be even, if that is worth a look.
+    pub even: Option<Effort>,
 }
 
 /// How far refs that may be one leaf are parted.
@@ -63,11 +66,30 @@ pub(crate) struct Limits<'s, 'a> {
 pub(crate) enum Depth {
     /// Not at all.
     Whole,
+    /// Until they are [alike](are_alike).
+    Alike,
     /// As long as it pays.
     Paying,
     /// As long as the leaves last.
     Deep,
 }
+
+/// Whether a few refs, in a box of the area `whole`, may as well be one leaf: none is much larger than the others, so that it
+/// would have them visited in vain, and they lie close together.
+fn are_alike(refs: &[PrimRef], whole: f32, areas: Areas) -> bool {
+    let (mut sum, mut most) = (0.0, 0.0);
+    for r in refs {
+        let area = areas.of_finite(&r.bounds);
+        sum += area;
+        most = greater(area, most);
+    }
+    most * refs.len() as f32 <= LARGEST * sum && whole <= APART * sum
+}
+
+/// The largest of a few refs that are alike, over their mean.
+const LARGEST: f32 = 1.5;
+/// The area of the box around them, over the sum of theirs.
+const APART: f32 = 1.2;
 
 /// Cost of a step to two children, in tests of one primitive.
 const STEP_COST: f32 = 2.0;
@@ -114,7 +136,7 @@ impl<'s, 'a> Splitter<'_, 's, 'a> {
             let first = task.first - whole.first;
             let slots = refs.get_mut(first..first + task.room)?;
             let refs = slots.get(..task.count)?;
-            let extent = task.known.extent(refs, self.step(refs));
+            let extent = task.known.extent(refs, self.step(refs, task.even));
             let split = self.part(slots, &task, &extent, &mut scratch);
             let aabb = extent.bounds.aabb();
             let node = match &split {
@@ -163,7 +185,8 @@ impl Splitter<'_, '_, '_> {
         extent: &Extent,
         bins: &mut Bins,
     ) -> Option<Split> {
-        let (Limits { leaf_max, depth, effort, .. }, areas) = (*self.limits, self.areas);
+        let (Limits { leaf_max, depth, .. }, areas) = (*self.limits, self.areas);
+        let effort = self.effort(task.even);
         let mixed = SPHERES && self.limits.mixed;
         // Only wide trees are not parted just as long as it pays.
         let depth = if WIDE { depth } else { Depth::Paying };
@@ -174,21 +197,25 @@ impl Splitter<'_, '_, '_> {
         if may_be_leaf && (count == 1 || task.budget < 2 || depth == Depth::Whole) {
             return None;
         }
+        let whole = || areas.of(&extent.bounds.aabb());
+        if may_be_leaf && depth == Depth::Alike && are_alike(refs, whole(), areas) {
+            return None;
+        }
         let pays = |work: f32| {
-            let area = areas.of(&extent.bounds.aabb());
+            let area = whole();
             // Everything on one line or in one point: any split is as good as another.
             STEP_COST * area + work < area * count as f32 || area == 0.0
         };
         let lasts = |left_count: usize| self.lasts(task, [left_count, count - left_count]);
         let sah = if count <= FEW {
             let sweep = sweep(refs, areas, lasts)
-                .filter(|s| !may_be_leaf || depth == Depth::Deep || pays(s.work));
-            sweep.map(|s| self.split_at(refs, s.left_count))
+                .filter(|s| !may_be_leaf || depth != Depth::Paying || pays(s.work));
+            sweep.map(|s| self.split_at(refs, s.left_count, task.even))
         } else {
             // None when all centres are in one point.
             best_plane(refs, &extent.centres, areas, effort, bins).and_then(|plane| {
                 let left_count = plane.part(refs);
-                lasts(left_count).then(|| self.split_at(refs, left_count))
+                lasts(left_count).then(|| self.split_at(refs, left_count, task.even))
             })
         };
         match sah {
@@ -197,9 +224,9 @@ impl Splitter<'_, '_, '_> {
             // Few, but of two kinds: each kind can be one leaf.
             None if SPHERES && count <= leaf_max => {
                 sort_few(refs, |r| (r.is_sphere(), r.id()));
-                Some(Split { least: [1, 1], ..self.split_at(refs, count - spheres) })
+                Some(Split { least: [1, 1], ..self.split_at(refs, count - spheres, task.even) })
             }
-            None => Some(self.split_at(refs, count / 2)),
+            None => Some(self.split_at(refs, count / 2, task.even)),
         }
     }
 
@@ -213,8 +240,9 @@ impl Splitter<'_, '_, '_> {
     ) -> Option<Split> {
         let refs = slots.get(..task.count)?;
         let (left, right) = refs.split_at_checked(split.counts[0])?;
-        let of_side =
-            |side: usize, refs: &[PrimRef]| split.sides[side].extent(refs, self.step(refs));
+        let of_side = |side: usize, refs: &[PrimRef]| {
+            split.sides[side].extent(refs, self.step(refs, split.even[side]))
+        };
         let [left, right] = [of_side(0, left), of_side(1, right)];
         let areas = self.areas;
         let area = areas.of(&extent.bounds.aabb());
@@ -235,7 +263,7 @@ impl Splitter<'_, '_, '_> {
         }
         let counts = cut.part(slots, task.count, shapes)?;
         let refs = slots.get(..counts[0] + counts[1])?;
-        Some(self.split_at(refs, counts[0]))
+        Some(self.split_at(refs, counts[0], task.even))
     }
 
     /// The fewest leaves that two sides need.
@@ -253,17 +281,33 @@ impl Splitter<'_, '_, '_> {
         left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
     }
 
-    /// The sides of a place between refs.
-    fn split_at(self, refs: &[PrimRef], left_count: usize) -> Split {
+    /// The sides of a place between refs, which are known to be `even` or not.
+    fn split_at(self, refs: &[PrimRef], left_count: usize, even: bool) -> Split {
         let (left, right) = refs.split_at_checked(left_count).unwrap_or((refs, &[]));
         let counts = [left.len(), right.len()];
-        let known = |refs: &[PrimRef]| Known::of_side(refs, self.step(refs));
-        Split { counts, least: self.fewest(counts), sides: [known(left), known(right)] }
+        let even = [left, right].map(|refs| even || self.are_even(refs));
+        let known = |refs: &[PrimRef], even| Known::of_side(refs, self.step(refs, even));
+        let sides = [known(left, even[0]), known(right, even[1])];
+        Split { counts, least: self.fewest(counts), even, sides }
+    }
+
+    /// Whether a part of an uneven scene is even, and large enough for that to matter.
+    fn are_even(self, refs: &[PrimRef]) -> bool {
+        // Compact trees do not ask.
+        let effort = self.limits.even.filter(|_| WIDE);
+        effort.is_some_and(|effort| {
+            effort.step(refs.len()) > 1 && effort.is_even(unevenness(refs, self.areas))
+        })
+    }
+
+    /// How carefully planes are chosen for a node.
+    fn effort(self, even: bool) -> Effort {
+        self.limits.even.filter(|_| WIDE && even).unwrap_or(self.limits.effort)
     }
 
     /// Of so many refs one is looked at to choose a plane.
-    pub fn step(self, refs: &[PrimRef]) -> usize {
-        self.limits.effort.step(refs.len())
+    pub fn step(self, refs: &[PrimRef], even: bool) -> usize {
+        self.effort(even).step(refs.len())
     }
 }
 
@@ -306,7 +350,8 @@ pub(super) mod tests {
                 let mut refs = series(count, ratio);
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
                 let effort = Effort::BALANCED;
-                let limits = Limits { leaves, source: None, leaf_max, mixed: false, depth, effort };
+                let (source, even) = (None, None);
+                let limits = Limits { leaves, source, leaf_max, mixed: false, depth, effort, even };
                 let caller = &Caller::new(None, None);
                 let used = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");
                 let levels = levels(&nodes[..used.nodes]);
@@ -315,5 +360,26 @@ pub(super) mod tests {
             }
         }
         assert!(deepest > 55, "the series is no test: {deepest}");
+    }
+
+    #[test]
+    fn a_wall_is_not_alike_to_chairs() {
+        let of = |boxes: &[([f32; 3], f32)]| {
+            let mut around = Aabb::EMPTY;
+            let refs: std::vec::Vec<_> = (boxes.iter())
+                .map(|(lower, edge)| {
+                    let aabb = Aabb { lower: *lower, upper: lower.map(|x| x + edge) };
+                    around.add(&aabb);
+                    PrimRef::new(0, &aabb, false)
+                })
+                .collect();
+            let areas = Areas::new(&Aabb { lower: [0.0; 3], upper: [1.0; 3] });
+            are_alike(&refs, areas.of(&around), areas)
+        };
+        let chair = |x: f32| ([x, 0.0, 0.0], 0.125);
+        assert!(of(&[chair(0.0), chair(0.125), chair(0.25)]), "side by side");
+        assert!(!of(&[chair(0.0), chair(0.125), ([0.0; 3], 0.5)]), "with a wall");
+        assert!(!of(&[chair(0.0), chair(0.75)]), "far apart");
+        assert!(of(&[([0.5; 3], 0.0); 4]), "all in one point");
     }
 }

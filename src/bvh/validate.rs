@@ -17,7 +17,7 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
     if nodes.len() < 2 {
         return false;
     }
-    let mut right = Pending::new();
+    let mut right = Pending::NONE;
     let mut next_pair = 2;
     let mut at = 0;
     loop {

@@ -127,11 +127,11 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
 
 /// Offers `query` everything the ray meets, near bundles first; true when it ended the search.
 #[inline(always)]
-pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
+pub(crate) fn traverse_wide<S: Simd + Width<W>, L: Late, Q: Query, const W: usize>(
     s: S,
     bundles: &[Bundle<W>],
     leaves: &Leaves,
-    (late, prepared): (&impl Late, &mut Option<PreparedRay>),
+    (late, prepared): (&L, &mut Option<PreparedRay>),
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
@@ -147,7 +147,7 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
                 return false;
             }
             fetch(s, bundles, leaves, walk.later());
-            if prepared.is_none() {
+            if L::SOON && prepared.is_none() {
                 // Many rays pass the whole scene by, so this is worth a question a bundle.
                 if walk.at() == ChildRef::NONE {
                     return false;
@@ -155,9 +155,13 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
                 *prepared = Some(late.prepare());
             }
         }
-        let (false, Some(ray)) = (walk.at() == ChildRef::NONE, prepared.as_ref()) else {
+        if walk.at() == ChildRef::NONE {
             return false;
-        };
+        }
+        if !L::SOON && prepared.is_none() {
+            *prepared = Some(late.prepare());
+        }
+        let Some(ray) = prepared.as_ref() else { return false };
         if walk.open(s, leaves, ray, query) {
             return true;
         }

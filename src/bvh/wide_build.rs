@@ -1,7 +1,7 @@
 //! The wide layouts: from a scene to bundles in the caller's memory.
 
 use super::How;
-use super::branch::{Size, grow, unevenness};
+use super::branch::{Size, grow};
 use super::budget::leaf_budget;
 use super::choose::choose;
 use super::collapse::Grounds;
@@ -11,6 +11,7 @@ use super::fill::pack;
 use super::refs::{PrimRef, gather, refs_per_prim};
 use super::reinsert::mend;
 use super::split::Areas;
+use super::spread::unevenness_of_all;
 use super::tree::{Depth, Limits};
 use crate::block::bundle::{Bundle, LANE};
 use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
@@ -73,15 +74,16 @@ impl Places {
         (end <= nodes).then_some(Places { refs, nodes, room, leaves })
     }
 
-    /// What an uneven scene wants at the best quality, as far as `size` bytes reach: a leaf for every other ref, as a wall
-    /// shall not be in one with a chair; and, if refs may be cut, a quarter more of them, which takes half
-    /// of what is free at most.
-    fn for_uneven(self, cut: bool, size: usize) -> Places {
+    /// What `count` refs of an uneven scene want, as far as `size` bytes reach: a leaf for each of them, as a wall shall
+    /// not be in one with a chair; and, if refs may be cut, a quarter more of them, which takes half of what is free at most.
+    /// These places have room for so many refs and for `least` leaves.
+    fn for_uneven(self, count: usize, least: usize, cut: bool, size: usize) -> Places {
         const REF: usize = size_of::<PrimRef>();
-        let free = self.nodes - self.refs - self.room * REF;
-        let more = if cut { (self.room / 4).min(free / (2 * REF)) } else { 0 };
-        let most = self.leaves + (free - more * REF) / PAIR;
-        let (room, leaves) = (self.room + more, ((self.room + more) / 2).clamp(self.leaves, most));
+        let free = (self.nodes + self.leaves * PAIR - self.refs)
+            .saturating_sub(count * REF + least * PAIR);
+        let more = if cut { (count / 4).min(free / (2 * REF)) } else { 0 };
+        let room = count + more;
+        let leaves = room.min(least + (free - more * REF) / PAIR).max(least);
         self.fitting(room, leaves, size).unwrap_or(self)
     }
 }
@@ -206,13 +208,12 @@ fn grow_tree(
     let areas = Areas::new(&census.bounds);
     let refs = storage::view_mut::<PrimRef>(bytes, places.refs, places.room)?;
     let Gathered { count, strip, leaves } = gather_strips(scene, census, places.leaves, how, refs);
-    let uneven = how.effort.for_uneven(unevenness(refs.get(..count)?, areas, how.caller));
+    let unevenness = unevenness_of_all(refs.get(..count)?, areas, how.caller);
+    let uneven = how.effort.for_uneven(unevenness);
     // Spheres are not cut, nor is what will move.
     let cut = uneven.is_some_and(|effort| effort.cuts) && census.sphere_count == 0 && !census.refit;
     let places = match uneven {
-        Some(effort) if effort.cuts => places.for_uneven(cut, bytes.len()),
-        // Here, too, a wall shall not be in a leaf with a chair.
-        Some(_) => Places { leaves: places.leaves.min(count).max(leaves), ..places },
+        Some(_) => places.for_uneven(count, leaves, cut, bytes.len()),
         None => Places { leaves, ..places },
     };
     let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
@@ -226,8 +227,13 @@ fn grow_tree(
         source: cut.then_some(Source { scene, geometries, named: false }),
         leaf_max: leaf_max(census, strip),
         mixed: census.is_mixed(),
-        depth: if effort.whole { Depth::Whole } else { Depth::Deep },
+        depth: match uneven {
+            Some(_) => Depth::Alike,
+            None if effort.whole => Depth::Whole,
+            None => Depth::Deep,
+        },
         effort,
+        even: uneven.map(|_| how.effort),
     };
     let size = grow(nodes, slots, count, &limits, how.caller)?;
     let (free, ids) = ids_to_end(refs, &size)?;

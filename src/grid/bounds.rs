@@ -168,11 +168,11 @@ impl Walker<'_> {
                     return true;
                 }
             }
-            let side = [1, 1, 2, 5][self.random.below(4)];
-            if !(if side == 1 {
+            let ahead = [0.0, 0.0, 1.0, 4.0][self.random.below(4)];
+            if !(if ahead == 0.0 {
                 level.step(Scalar, NO_BOUND)
             } else {
-                level.jump(Scalar, side, NO_BOUND)
+                level.jump(Scalar, ahead, NO_BOUND)
             }) {
                 break;
             }

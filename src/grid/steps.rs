@@ -32,7 +32,7 @@ pub(super) struct Level<V> {
     exit: V,
     /// The word of the cell.
     pub place: u32,
-    /// The word of the cell with the lowest turned coordinates.
+    /// The word of the cell with the lowest turned coordinates would be one further along each axis: cells are told by their walls ahead.
     pub corner: u32,
     /// From a cell's word to the next one's along each axis; below zero, by wrapping, along turned ones.
     pub strides: [u32; 3],
@@ -59,7 +59,8 @@ impl<V: Lanes<4>> Level<V> {
         let pace = Width::<4>::splat(s, 1.0).div(speed);
         let times = [Width::<4>::splat(s, 0.0), Width::<4>::splat(s, exit)];
         let last = whole_floats(s, ray.resolution);
-        Level::new(s, [from, speed, pace, last], (first, ray.resolution), ray.turned, times)
+        let line = [from, speed, pace, last];
+        Level::new(s, line, from, (first, ray.resolution), ray.turned, times)
     }
 
     /// The walk through the grid in the cell, whose resolution is at word `first`.
@@ -73,37 +74,38 @@ impl<V: Lanes<4>> Level<V> {
         let n = whole_floats(s, resolution);
         let cell = self.wall.min(self.last).sub(Width::<4>::splat(s, 1.0));
         let from = self.from.sub(cell).mul(n);
-        let line = [from, self.speed.mul(n), self.pace.div(n), n];
+        let speed = self.speed.mul(n);
+        let line = [from, speed, self.pace.div(n), n];
         let leaves = s.least_of_three(self.times()).mul(Width::<4>::splat(s, 1.0 - EARLIER));
         let times = [self.entered, leaves.min(self.exit)];
-        Level::new(s, line, (first, resolution), turned, times)
+        let at = speed.mul(self.entered).add(from);
+        Level::new(s, line, at, (first, resolution), turned, times)
     }
 
+    /// The walk in the cell in which it comes in, or the nearest.
     #[inline(always)]
     fn new<S: Simd + Width<4, V = V>>(
         s: S,
         [from, speed, pace, last]: [V; 4],
+        at: V,
         (first, resolution): (u32, [u32; 3]),
         turned: [u32; 3],
         [entered, exit]: [V; 2],
     ) -> Self {
         let one = Width::<4>::splat(s, 1.0);
-        let (mut strides, mut corner) = ([0; 3], first.wrapping_add(1));
+        let (mut strides, mut lowest, mut diagonal) = ([0; 3], first.wrapping_add(1), 0u32);
         let mut stride = 1u32;
         for k in 0..3 {
             let n = resolution[k];
             strides[k] = (stride ^ turned[k]).wrapping_sub(turned[k]);
-            corner = corner.wrapping_add(n.wrapping_sub(1).wrapping_mul(stride) & turned[k]);
+            lowest = lowest.wrapping_add(n.wrapping_sub(1).wrapping_mul(stride) & turned[k]);
+            diagonal = diagonal.wrapping_add(strides[k]);
             stride = stride.wrapping_mul(n);
         }
-        // The cell where it is when it enters, or the nearest.
-        let at = speed.mul(entered).add(from).max(Width::<4>::splat(s, 0.0));
-        let cell = s.whole(at.min(last.sub(one)));
+        let cell = s.whole(at.max(Width::<4>::splat(s, 0.0)).min(last.sub(one)));
         let wall = s.floats(cell).add(one);
-        let mut level =
-            Level { from, speed, pace, wall, last, entered, exit, place: 0, corner, strides };
-        level.place = level.word_of(cell);
-        level
+        let (place, corner) = (word(lowest, strides, cell), lowest.wrapping_sub(diagonal));
+        Level { from, speed, pace, wall, last, entered, exit, place, corner, strides }
     }
 
     /// Of each axis `from`, `speed`, `pace`, `wall` and `last`.
@@ -155,17 +157,7 @@ impl<V: Lanes<4>> Level<V> {
         self.wall.sub(self.from).mul(self.pace)
     }
 
-    /// The word of a cell.
-    #[inline(always)]
-    fn word_of(&self, cell: [i32; 4]) -> u32 {
-        let mut word = self.corner;
-        for (cell, stride) in cell.into_iter().zip(self.strides) {
-            word = word.wrapping_add((cell as u32).wrapping_mul(stride));
-        }
-        word
-    }
-
-    /// Whether the ray is in a box in the cell up to the bound, and between which times.
+    /// Between which times the ray is in a box in the cell, if it is up to the bound.
     #[inline(always)]
     pub fn times_in<S: Simd + Width<4, V = V>>(
         &self,
@@ -173,20 +165,26 @@ impl<V: Lanes<4>> Level<V> {
         cell_box: CellBox,
         sides: Sides<V>,
         bound: V,
-    ) -> (bool, [f32; 2]) {
+    ) -> Option<[f32; 2]> {
         let [lower, upper] = [cell_box.lower, cell_box.upper].map(|corner| corner.map(i32::from));
         let (lower, upper) = (s.floats(lower), s.floats(upper));
-        let half = upper.sub(lower).mul(Width::<4>::splat(s, CellBox::STEP / 2.0)).mul(self.pace);
+        // Exact, fused or not: few bits are needed for where the box lies from where steps begin.
+        let half = upper.sub(lower).mul(Width::<4>::splat(s, CellBox::STEP / 2.0));
+        let middle = lower.add(upper);
+        let low = middle.fast_mul_sub(sides.half_step, half);
+        let high = middle.fast_mul_add(sides.half_step, half);
+        // What does not wait for the box.
         let cell = self.wall.min(self.last).sub(Width::<4>::splat(s, 1.0));
-        let middle = lower.add(upper).mul(sides.half_step).add(sides.begin).add(cell);
-        let middle = middle.sub(self.from).mul(self.pace);
-        let near = s.largest_of_three(middle.sub(half));
-        let far = s.least_of_three(middle.add(half));
-        let is_in = near.less_or_equal(far.min(bound)) & 1 == 1;
+        let begin = cell.add(sides.begin).sub(self.from);
+        let near = s.largest_of_three(low.add(begin).mul(self.pace));
+        let far = s.least_of_three(high.add(begin).mul(self.pace));
+        if near.less_or_equal(far.min(bound)) & 1 == 0 {
+            return None;
+        }
         let [mut begin, mut end] = [[0.0; 4]; 2];
         near.store(&mut begin);
         far.store(&mut end);
-        (is_in, [begin[0], end[0]])
+        Some([begin[0], end[0]])
     }
 
     /// Whether the walk came into its cell before the bound.
@@ -240,11 +238,11 @@ impl<V: Lanes<4>> Level<V> {
         self.wall = self.wall.add(s.where_less_or_equal(beyond, self.wall, never));
     }
 
-    /// Goes through the cube of `side` empty cells ahead, the cell itself included; false when it ends beyond the exit or the bound.
+    /// Goes through the cube of empty cells ahead, which reaches so many cells beyond this one; false when it ends beyond the exit or the bound.
     #[inline(always)]
-    pub fn jump<S: Simd + Width<4, V = V>>(&mut self, s: S, side: u8, bound: V) -> bool {
+    pub fn jump<S: Simd + Width<4, V = V>>(&mut self, s: S, ahead: f32, bound: V) -> bool {
         let one = Width::<4>::splat(s, 1.0);
-        let far = self.wall.add(Width::<4>::splat(s, f32::from(side - 1)));
+        let far = self.wall.add(Width::<4>::splat(s, ahead));
         let times = far.sub(self.from).mul(self.pace);
         let least = s.least_of_three(times);
         if least.less_or_equal(self.exit.min(bound)) & 1 == 0 {
@@ -257,8 +255,8 @@ impl<V: Lanes<4>> Level<V> {
         let along = s.where_less_or_equal(times, least, far).max(along);
         self.wall = along.add(s.where_less_or_equal(times, least, one));
         self.entered = least;
+        self.place = word(self.corner, self.strides, s.whole(self.wall.min(self.last)));
         self.stay_inside(s);
-        self.place = self.word_of(s.whole(self.wall.min(self.last).sub(one)));
         true
     }
 
@@ -275,6 +273,16 @@ impl<V: Lanes<4>> Level<V> {
         let cell = [0, 1, 2].map(|k| wall[k] - 1.0);
         Seen { cell, times: [entered[0], end.max(entered[0])] }
     }
+}
+
+/// The word so many cells along each axis from another.
+#[inline(always)]
+fn word(first: u32, strides: [u32; 3], cells: [i32; 4]) -> u32 {
+    let mut word = first;
+    for (cells, stride) in cells.into_iter().zip(strides) {
+        word = word.wrapping_add((cells as u32).wrapping_mul(stride));
+    }
+    word
 }
 
 /// How boxes in cells are turned with the ray.

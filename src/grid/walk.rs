@@ -75,7 +75,7 @@ fn follow<S: Simd, Q: Query>(
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    let mut outer = Outer::NONE;
+    let mut outer = Outer::<S>::NONE;
     loop {
         query.watch().step();
         let word = way.word(cells);
@@ -86,12 +86,12 @@ fn follow<S: Simd, Q: Query>(
                 true
             }
             Cell::Run(_) | Cell::Boxed(_) => {
-                let (is_in, listed) = match cell(word) {
+                let listed = match cell(word) {
                     Cell::Boxed(first) => way.listed(s, cells, first),
-                    Cell::Run(first) => (true, Listed::always(first)),
-                    _ => (false, Listed::always(0)),
+                    Cell::Run(first) => Some(Listed::always(first)),
+                    _ => None,
                 };
-                if is_in {
+                if let Some(listed) = listed {
                     if visit(s, cells, listed, ray, slab, query) {
                         return true;
                     }
@@ -100,7 +100,7 @@ fn follow<S: Simd, Q: Query>(
                 way.step(s)
             }
         };
-        if !goes_on && !way.leave(&outer) {
+        if !goes_on && !way.leave(&mut outer) {
             return false;
         }
     }

@@ -5,7 +5,7 @@
 
 use super::steps::Level;
 use super::walk::Cells;
-use super::way::{Listed, Outer, Way, inner, slack, time_above};
+use super::way::{Listed, Outer, Way, inner, next_outer, time_above};
 use crate::block::cells::{Cell, CellBox, EMPTY, cell};
 use crate::math::Bits;
 use crate::ray::Sixteen;
@@ -34,7 +34,6 @@ pub(crate) struct Walks<S: Simd> {
     start: [f64; 16],
     t_bound: Sixteen,
     turned: [[u32; 3]; 16],
-    depth: [usize; 16],
     outer: [Outer<S>; 16],
 }
 
@@ -70,8 +69,7 @@ impl<S: Simd> Walks<S> {
         start: [0.0; 16],
         t_bound: [0.0; 16],
         turned: [[0; 3]; 16],
-        depth: [0; 16],
-        outer: [const { Outer::NONE }; 16],
+        outer: [const { Outer::<S>::NONE }; 16],
     };
 
     /// A walk begins.
@@ -85,7 +83,7 @@ impl<S: Simd> Walks<S> {
         self.shift[lane] = 3 * way.octant;
         self.start[lane] = way.start;
         self.turned[lane] = way.turned;
-        self.depth[lane] = 0;
+        self.outer[lane].clear();
         self.t_bound[lane] = way.t_bound;
         self.bound[lane] = time_above(f64::from(way.t_bound), way.start);
     }
@@ -160,31 +158,31 @@ impl<S: Simd> Walks<S> {
                 [corners[0][lane % 16], corners[1][lane % 16]] = run.cell_box().words();
             }
         }
-        let splat = Width::<16>::splat(s, CellBox::STEP / 2.0);
+        let one = Width::<16>::splat(s, 1.0);
+        let half_step = Width::<16>::splat(s, CellBox::STEP / 2.0);
         let mut near = Width::<16>::splat(s, f32::NEG_INFINITY);
         let mut far = Width::<16>::splat(s, f32::INFINITY);
         for k in 0..3 {
             let lower = Width::<16>::load(s, &bytes(&corners[0], k));
             let upper = Width::<16>::load(s, &bytes(&corners[1], k));
             let pace = Width::<16>::load(s, &self.pace[k]);
-            let half = upper.sub(lower).mul(splat).mul(pace);
-            let cell = self.cell(s, k);
+            let half = upper.sub(lower).mul(half_step);
             let middle = lower.add(upper).mul(Width::<16>::load(s, &self.half_step[k]));
-            let middle = middle.add(Width::<16>::load(s, &self.begin[k])).add(cell);
-            let middle = middle.sub(Width::<16>::load(s, &self.from[k])).mul(pace);
-            near = middle.sub(half).max(near);
-            far = middle.add(half).min(far);
+            let cell = self.wall_ahead(s, k).sub(one);
+            let begin = cell.add(Width::<16>::load(s, &self.begin[k]));
+            let begin = begin.sub(Width::<16>::load(s, &self.from[k]));
+            near = middle.sub(half).add(begin).mul(pace).max(near);
+            far = middle.add(half).add(begin).mul(pace).min(far);
         }
         near.store(&mut found.times[0]);
         far.store(&mut found.times[1]);
         lanes & near.less_or_equal(far.min(Width::<16>::load(s, &self.bound)))
     }
 
-    /// The cells along an axis.
+    /// The walls ahead along an axis, the last one where a walk stays.
     #[inline(always)]
-    fn cell(&self, s: S, k: usize) -> <S as Width<16>>::V {
-        let wall = Width::<16>::load(s, &self.wall[k]);
-        wall.min(Width::<16>::load(s, &self.last[k])).sub(Width::<16>::splat(s, 1.0))
+    fn wall_ahead(&self, s: S, k: usize) -> <S as Width<16>>::V {
+        Width::<16>::load(s, &self.wall[k]).min(Width::<16>::load(s, &self.last[k]))
     }
 
     /// What a walk that has found something listed may meet.
@@ -196,9 +194,8 @@ impl<S: Simd> Walks<S> {
             Cell::Run(first) => return Listed::always(first),
             _ => return Listed::always(usize::MAX),
         };
-        let [near, far] = [found.times[0][lane], found.times[1][lane]];
-        let [near, far] = [near, far].map(|time| (self.start[lane] + f64::from(time)) as f32);
-        Listed { first: first + 1, begin: near - slack(near), end: far + slack(far) }
+        let times = [found.times[0][lane], found.times[1][lane]];
+        Listed::between(first + 1, times, self.start[lane])
     }
 
     /// Nothing beyond `t_bound` is of interest to a walk any more.
@@ -220,7 +217,7 @@ impl<S: Simd> Walks<S> {
         let bound = Width::<4>::splat(s, self.bound[lane]);
         self.put(lane, &inner(s, &level, cells, first, self.turned[lane]));
         if level.step(s, bound) {
-            self.outer[lane].push(&mut self.depth[lane], level);
+            self.outer[lane].push(level);
         }
     }
 
@@ -229,7 +226,7 @@ impl<S: Simd> Walks<S> {
     pub fn leave(&mut self, s: S, lane: usize) -> bool {
         let lane = lane % 16;
         let bound = Width::<4>::splat(s, self.bound[lane]);
-        let Some(next) = self.outer[lane].pop(&mut self.depth[lane], bound) else { return false };
+        let Some(next) = next_outer::<S>(&mut self.outer[lane], bound) else { return false };
         self.put(lane, &next);
         true
     }
@@ -255,11 +252,11 @@ impl<S: Simd> Walks<S> {
         for k in 0..3 {
             let passed = times[k].less_or_equal(least);
             self.move_along(s, k, (least, far[k]), (goes, passed));
-            let mut cell = [0.0; 16];
-            self.cell(s, k).add(Width::<16>::splat(s, WHOLE)).store(&mut cell);
+            let mut wall = [0.0; 16];
+            self.wall_ahead(s, k).add(Width::<16>::splat(s, WHOLE)).store(&mut wall);
             for (i, place) in place.iter_mut().enumerate() {
-                let cell = cell[i].to_bits() & (WHOLE as u32 - 1);
-                *place = place.wrapping_add(cell.wrapping_mul(self.strides[k][i]));
+                let wall = wall[i].to_bits() & (WHOLE as u32 - 1);
+                *place = place.wrapping_add(wall.wrapping_mul(self.strides[k][i]));
             }
         }
         for (i, place) in place.into_iter().enumerate() {
@@ -340,7 +337,7 @@ mod tests {
     use super::super::ray::CellRay;
     use super::super::space::Space;
     use super::*;
-    use crate::block::cells::{Run, SIDES, box_word};
+    use crate::block::cells::{AHEAD, Run, SIDES, box_word};
     use crate::math::Aabb;
     use crate::prim::Leaves;
     use crate::simd::Scalar;
@@ -371,8 +368,8 @@ mod tests {
         bits(a) == bits(b)
     }
 
-    fn seen(found: bool, listed: Listed) -> Option<(usize, u32, u32)> {
-        found.then_some((listed.first, listed.begin.to_bits(), listed.end.to_bits()))
+    fn seen(listed: Listed) -> (usize, u32, u32) {
+        (listed.first, listed.begin.to_bits(), listed.end.to_bits())
     }
 
     /// What is found and where it is gone, side by side and alone, to the bit.
@@ -400,9 +397,9 @@ mod tests {
                 found.words = core::array::from_fn(|lane| box_word(lane as u32));
                 found.listed = walks.look_at_boxes(Scalar, &cells, going, &mut found);
                 for lane in Bits(going) {
-                    let (is_in, alone) = ways[lane].listed(Scalar, &cells, lane);
-                    let beside = walks.listed(&found, lane);
-                    assert_eq!(seen(found.listed >> lane & 1 == 1, beside), seen(is_in, alone));
+                    let alone = ways[lane].listed(Scalar, &cells, lane).map(seen);
+                    let is_in = found.listed >> lane & 1 == 1;
+                    assert_eq!(is_in.then(|| seen(walks.listed(&found, lane))), alone);
                     boxes += u32::from(is_in);
                 }
                 let sides: [usize; 16] = core::array::from_fn(|_| random.below(8));
@@ -413,7 +410,7 @@ mod tests {
                 for lane in Bits(going) {
                     let bound = ways[lane].bound;
                     let level = &mut ways[lane].level;
-                    let alone = level.jump(Scalar, SIDES[sides[lane]], bound);
+                    let alone = level.jump(Scalar, AHEAD[sides[lane]], bound);
                     assert_eq!(goes >> lane & 1 == 1, alone);
                     assert!(!alone || are_equal(level, &walks.level(Scalar, lane)));
                     steps += u32::from(alone);

@@ -4,9 +4,10 @@ use super::ray::CellRay;
 use super::steps::{Level, Sides};
 use super::walk::Cells;
 use crate::block::cells::{
-    Cell, CellBox, EMPTY, GridHead, MOST_DEPTH, SIDES, cell, resolution, side_ahead,
+    AHEAD, Cell, CellBox, EMPTY, GridHead, MOST_DEPTH, cell, resolution, side_ahead,
 };
 use crate::math::rounding::UNIT32;
+use crate::pending::Pending;
 use crate::ray::{PreparedRay, Slab};
 use crate::simd::{Simd, Width};
 
@@ -35,13 +36,18 @@ impl Listed {
     pub fn always(first: usize) -> Self {
         Listed { first, begin: f32::NEG_INFINITY, end: f32::INFINITY }
     }
+
+    /// Between times that count from `start`, and a little more.
+    #[inline(always)]
+    pub(super) fn between(first: usize, times: [f32; 2], start: f64) -> Self {
+        let [near, far] = times.map(|time| (start + f64::from(time)) as f32);
+        Listed { first, begin: near - slack(near), end: far + slack(far) }
+    }
 }
 
 /// A ray in a cell. It is told what the cell's word says, and goes on.
 pub(crate) struct Way<S: Simd> {
     pub(super) level: Level<<S as Width<4>>::V>,
-    /// How many levels of [`Outer`] are in use.
-    depth: usize,
     pub turned: [u32; 3],
     pub octant: u32,
     pub(super) sides: Sides<<S as Width<4>>::V>,
@@ -52,33 +58,8 @@ pub(crate) struct Way<S: Simd> {
     pub(super) bound: <S as Width<4>>::V,
 }
 
-/// Where a way goes on behind inner grids.
-pub(super) struct Outer<S: Simd>([Option<Level<<S as Width<4>>::V>>; MOST_DEPTH - 1]);
-
-impl<S: Simd> Outer<S> {
-    pub const NONE: Self = Outer([None; MOST_DEPTH - 1]);
-
-    /// Remembers one more, behind `depth` others. A sound block has no deeper grids than there is room for.
-    #[inline(always)]
-    pub fn push(&mut self, depth: &mut usize, level: Level<<S as Width<4>>::V>) {
-        if let Some(place) = self.0.get_mut(*depth) {
-            *place = Some(level);
-            *depth += 1;
-        }
-    }
-
-    /// The last one of `depth`, if it follows up to the bound: those before it come later still.
-    #[inline(always)]
-    pub fn pop(
-        &self,
-        depth: &mut usize,
-        bound: <S as Width<4>>::V,
-    ) -> Option<Level<<S as Width<4>>::V>> {
-        *depth = depth.wrapping_sub(1);
-        let next = self.0.get(*depth).copied().flatten()?;
-        next.begins_before(bound).then_some(next)
-    }
-}
+/// Where a way goes on behind inner grids. A sound block has no deeper grids than there is room for.
+pub(super) type Outer<S> = Pending<Level<<S as Width<4>>::V>, { MOST_DEPTH - 1 }>;
 
 impl<S: Simd> Way<S> {
     /// The way of a ray through a grid.
@@ -131,7 +112,6 @@ impl<S: Simd> Way<S> {
         let turned = ray.turned;
         Way {
             level: Level::outermost(s, ray, first, ray.at(start), time_above(exit, start)),
-            depth: 0,
             turned,
             octant: turned[0] & 1 | turned[1] & 2 | turned[2] & 4,
             sides: Sides::new(s, turned),
@@ -151,7 +131,7 @@ impl<S: Simd> Way<S> {
     #[inline(always)]
     pub fn pass(&mut self, s: S, word: u32) -> bool {
         let side = side_ahead(word, self.octant);
-        if side > 0 { self.level.jump(s, SIDES[side], self.bound) } else { self.step(s) }
+        if side > 0 { self.level.jump(s, AHEAD[side], self.bound) } else { self.step(s) }
     }
 
     /// Goes into the grid in the cell, whose resolution is at word `first`.
@@ -159,19 +139,17 @@ impl<S: Simd> Way<S> {
     pub(super) fn enter(&mut self, s: S, cells: &Cells, first: usize, outer: &mut Outer<S>) {
         let inner = inner(s, &self.level, cells, first, self.turned);
         if self.level.step(s, self.bound) {
-            outer.push(&mut self.depth, self.level);
+            outer.push(self.level);
         }
         self.level = inner;
     }
 
-    /// What the ray may meet of the run behind the box of the cell, which is entry `first`, and whether it is in that box up to the
-    /// bound.
+    /// What the ray may meet of the run behind the box of the cell, which is entry `first`, if it is in that box up to the bound.
     #[inline(always)]
-    pub fn listed(&self, s: S, cells: &Cells, first: usize) -> (bool, Listed) {
+    pub fn listed(&self, s: S, cells: &Cells, first: usize) -> Option<Listed> {
         let cell_box = cells.runs.get(first).map_or(CellBox::WHOLE, |run| run.cell_box());
-        let (is_in, [near, far]) = self.level.times_in(s, cell_box, self.sides, self.bound);
-        let [near, far] = [near, far].map(|time| (self.start + f64::from(time)) as f32);
-        (is_in, Listed { first: first + 1, begin: near - slack(near), end: far + slack(far) })
+        let times = self.level.times_in(s, cell_box, self.sides, self.bound)?;
+        Some(Listed::between(first + 1, times, self.start))
     }
 
     /// Nothing beyond `t_bound` is of interest any more.
@@ -191,8 +169,8 @@ impl<S: Simd> Way<S> {
 
     /// Leaves an inner grid for the one around it; false when nothing follows up to the bound.
     #[inline(always)]
-    pub(super) fn leave(&mut self, outer: &Outer<S>) -> bool {
-        match outer.pop(&mut self.depth, self.bound) {
+    pub(super) fn leave(&mut self, outer: &mut Outer<S>) -> bool {
+        match next_outer::<S>(outer, self.bound) {
             Some(next) => {
                 self.level = next;
                 true
@@ -200,6 +178,15 @@ impl<S: Simd> Way<S> {
             None => false,
         }
     }
+}
+
+/// The last one that is outside, if it follows up to the bound: those before it come later still.
+#[inline(always)]
+pub(super) fn next_outer<S: Simd>(
+    outer: &mut Outer<S>,
+    bound: <S as Width<4>>::V,
+) -> Option<Level<<S as Width<4>>::V>> {
+    outer.pop().filter(|next| next.begins_before(bound))
 }
 
 /// The walk through the grid in the cell, whose resolution is at word `first`.
@@ -218,7 +205,7 @@ pub(super) fn inner<S: Simd>(
 
 /// More than rounding takes from a `t` of the frame. Branches for the float next to it would be guessed wrong half the time.
 #[inline(always)]
-pub(super) fn slack(t: f32) -> f32 {
+fn slack(t: f32) -> f32 {
     t.abs() * (2.0 * UNIT32) + f32::MIN_POSITIVE
 }
 

@@ -7,6 +7,7 @@ use crate::exact::{Line, volumes};
 use crate::math::rounding::UNIT32;
 use crate::math::{Aabb, wide};
 use crate::ray::Ray;
+use crate::simd::{Doubles, Halves, Simd};
 
 /// `p -> A p + b`, and the inverse of `A`.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +83,14 @@ impl Map {
         condition * (2.25 * f64::from(UNIT32) + condition / (1u64 << 47) as f64)
     }
 
+    /// The inverse as a [record](InstanceRecord) has it.
+    pub fn columns(&self) -> [f64; 10] {
+        let rows = &self.world_to_object;
+        core::array::from_fn(|i| {
+            rows.get(i % 3).filter(|_| i < 9).map_or(0.0, |row| row[i / 3 % 3])
+        })
+    }
+
     fn is_wild(&self) -> bool {
         // Written so that a NaN is wild.
         let size = self.widest(DVec3::ONE).max_element();
@@ -145,8 +154,21 @@ fn clamped(p: [f32; 3]) -> DVec3 {
 impl InstanceRecord {
     /// The map.
     pub fn map(&self) -> Map {
-        let InstanceRecord { object_to_world, world_to_object, .. } = *self;
-        Map { object_to_world, world_to_object }
+        let InstanceRecord { object_to_world, .. } = *self;
+        Map { object_to_world, world_to_object: self.inverse() }
+    }
+
+    /// A column of the inverse, and what follows it.
+    #[inline(always)]
+    fn column(&self, k: usize) -> &[f64; 4] {
+        self.world_to_object[3 * k..].first_chunk().unwrap_or(&[0.0; 4])
+    }
+
+    /// The rows of the inverse.
+    #[inline(always)]
+    fn inverse(&self) -> [[f64; 3]; 3] {
+        let [a, b, c, d, e, f, g, h, i, _] = self.world_to_object;
+        [[a, d, g], [b, e, h], [c, f, i]]
     }
 
     /// The ray in object space: sums in `f64`, in this order and without fusing, rounded once. `None` when a component of that
@@ -158,13 +180,40 @@ impl InstanceRecord {
         let [x, y, z] = ray.origin;
         let o = [from(x, shift_x), from(y, shift_y), from(z, shift_z)];
         let d = ray.direction.map(f64::from);
-        let mapped = |v: [f64; 3]| {
-            self.world_to_object.map(|[x, y, z]| ((x * v[0] + y * v[1]) + z * v[2]) as f32)
-        };
+        let mapped =
+            |v: [f64; 3]| self.inverse().map(|[x, y, z]| ((x * v[0] + y * v[1]) + z * v[2]) as f32);
         let (origin, direction) = (mapped(o), mapped(d));
         let finite = origin.iter().chain(&direction).all(|x| x.is_finite());
         let moves = direction.iter().any(|x| *x != 0.0);
         (finite && moves).then_some(Ray { origin, direction, ..*ray })
+    }
+
+    /// The same up to `t_max` by vectors where these are fast, in `room`, which is written as a whole, since vectors read it soon.
+    /// If there is no such ray this may also be one that hits nothing by definition.
+    #[inline(always)]
+    pub fn object_ray_by<'r, S: Simd>(
+        &self,
+        s: S,
+        ray: &Ray,
+        t_max: f32,
+        room: &'r mut [f32; 8],
+    ) -> Option<&'r Ray> {
+        if S::FLIES {
+            let row = ray.row();
+            let m = &self.object_to_world;
+            let shift = [m[3], m[7], m[11], 0.0, 0.0, 0.0, 0.0, 0.0];
+            let from = s.widened(row).sub(s.widened(&shift));
+            let [x, y, z] = from.spread();
+            let [along_x, along_y, along_z] = [0, 1, 2].map(|k| self.column(k));
+            let sum = s.twice(along_x).mul(x).add(s.twice(along_y).mul(y));
+            let sum = sum.add(s.twice(along_z).mul(z));
+            *room = s.narrowed(sum.beside(from, f64::from(t_max)));
+        } else {
+            let [from, along] = self.object_ray(&Ray { t_max, ..*ray })?.rows();
+            room[..4].copy_from_slice(&from);
+            room[4..].copy_from_slice(&along);
+        }
+        Some(Ray::of_row(room))
     }
 }
 

@@ -41,12 +41,11 @@ pub(crate) fn write(
         let placing = placed.get(i)?;
         let child = children.binary_search(&address(&placing)).ok()?;
         *record = InstanceRecord {
-            world_to_object: placing.map.world_to_object,
-            object_to_world: placing.map.object_to_world,
-            bounds: placed.aabb_of(&placing),
+            world_to_object: placing.map.columns(),
             child: child as u32,
             mask: placing.mask,
-            reserved: [0; 2],
+            object_to_world: placing.map.object_to_world,
+            bounds: placed.aabb_of(&placing),
         };
     }
     rest.fill(0);

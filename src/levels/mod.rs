@@ -16,12 +16,12 @@ use core::marker::PhantomData;
 
 use crate::block::Finished;
 use crate::block::level::{InstanceRecord, Level};
-use crate::query::{Choice, Counts, Decide, Exact, QueryOptions, Watch, Watertight, shares_bit};
+use crate::query::{Choice, Decide, Exact, QueryOptions, Watch, Watertight, shares_bit};
 use crate::ray::{Hit, NONE, Ray};
 use crate::simd::Simd;
 use crate::trace::{AnyHit, ClosestHit, ClosestMet, MEMORY, ask, ask_by};
 
-use through::{Search, visit, visit_by};
+use through::{Begin, Search, through};
 
 pub(crate) use reach::visit_reached;
 pub(crate) use together::{any_of_each, closest_of_each};
@@ -35,15 +35,7 @@ pub(crate) fn closest<D: Across, W: Watch>(
     watch: W,
 ) -> Option<Hit> {
     let level = &block.level()?;
-    let decide = PhantomData::<D>;
-    let mut search = ClosestSearch { block, level, options, ray: *ray, best: None, watch, decide };
-    if !Shown::own(block).is_empty() {
-        visit(&mut search, NONE);
-    }
-    let (start, mut counts) = (search.ray, Counts::default());
-    visit_by::<W>(level, &start, &mut search, &mut counts);
-    search.watch.steps(counts.steps);
-    search.best.map(|best| best.hit)
+    through::<ClosestSearch<D, W>>(&World { block, level, options }, ray, watch)
 }
 
 /// Whether anything that `options` leave is hit in a block with instances.
@@ -55,79 +47,168 @@ pub(crate) fn any<D: Decide, W: Watch>(
     watch: W,
 ) -> bool {
     let Some(level) = &block.level() else { return false };
-    let decide = PhantomData::<D>;
-    let mut search = AnySearch { block, level, options, ray, hit: false, watch, decide };
-    if !Shown::own(block).is_empty() {
-        visit(&mut search, NONE);
-    }
-    if !search.hit {
-        let mut counts = Counts::default();
-        visit_by::<W>(level, ray, &mut search, &mut counts);
-        search.watch.steps(counts.steps);
-    }
-    search.hit
+    through::<AnySearch<D, W>>(&World { block, level, options }, ray, watch)
 }
 
 /// The search for the closest hit.
 struct ClosestSearch<'a, 'm, D, W> {
-    block: Finished<'m>,
-    level: &'a Level<'m>,
-    options: &'a QueryOptions,
+    world: &'a World<'a, 'm>,
+    ray: &'a Ray,
     /// Up to the best hit so far.
-    ray: Ray,
-    best: Option<Best<'m>>,
+    t_max: f32,
+    best: Option<Hit>,
     watch: W,
     decide: PhantomData<D>,
 }
 
-impl<D: Across, W: Watch> Search for ClosestSearch<'_, '_, D, W> {
+impl<'a, 'm, D: Across, W: Watch> Begin<'a, 'm> for ClosestSearch<'a, 'm, D, W> {
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, s: S, instance: u32) -> Option<f32> {
-        let place = Shown::at(self.block, self.level, instance, self.options, &self.ray);
-        if let Some((shown, ray)) = place {
-            let question =
-                ClosestHit::<D, _, MEMORY>::new(shown.choice(self.options), self.watch.lend());
-            let mut room = [[0.0; 4]; 2];
-            if let Some(hit) = ask_by(s, shown.block, ray.settled(s, &mut room), question) {
-                self.take(Best { hit: Hit { instance, ..hit }, shown, ray });
-            }
-        }
-        Some(self.ray.t_max)
+    fn new(world: &'a World<'a, 'm>, ray: &'a Ray, watch: W) -> Self {
+        ClosestSearch { world, ray, t_max: ray.t_max, best: None, watch, decide: PhantomData }
     }
 }
 
-impl<'m, D: Across, W> ClosestSearch<'_, 'm, D, W> {
-    fn take(&mut self, found: Best<'m>) {
-        if self.best.as_ref().is_none_or(|best| found.is_before::<D>(best, self.options)) {
+impl<D: Across, W: Watch> Search for ClosestSearch<'_, '_, D, W> {
+    type Watch = W;
+    type Found = Option<Hit>;
+
+    #[inline(always)]
+    fn own<S: Simd>(&mut self, s: S) -> Option<f32> {
+        let own = Shown::own(self.world.block);
+        if !own.is_empty() {
+            let question = own.closest_hit::<D, _>(self.world.options, self.watch.lend());
+            if let Some(hit) = ask_by(s, own.block, self.ray, question) {
+                self.take(hit);
+            }
+        }
+        Some(self.t_max)
+    }
+
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, s: S, instance: u32) -> Option<f32> {
+        let mut room = [0.0; 8];
+        if let Some((shown, record)) = self.world.shown(instance)
+            && let Some(ray) = record.object_ray_by(s, self.ray, self.t_max, &mut room)
+        {
+            let question = shown.closest_hit::<D, _>(self.world.options, self.watch.lend());
+            if let Some(hit) = ask_by(s, shown.block, ray, question) {
+                self.take(Hit { instance, ..hit });
+            }
+        }
+        Some(self.t_max)
+    }
+
+    #[inline(always)]
+    fn found(mut self, steps: u64) -> Option<Hit> {
+        self.watch.steps(steps);
+        self.best
+    }
+}
+
+impl<D: Across, W> ClosestSearch<'_, '_, D, W> {
+    #[inline(always)]
+    fn take(&mut self, hit: Hit) {
+        let first = match &self.best {
+            // Copies are lent: what is known of the best had better stay in registers.
+            Some(best) => self.world.is_before::<D>(self.ray, &{ hit }, &{ *best }),
+            None => true,
+        };
+        if first {
             // Not below the real `t`, which the hit's is rounded from.
-            self.ray.t_max = found.hit.t.next_up().min(self.ray.t_max);
-            self.best = Some(found);
+            self.t_max = hit.t.next_up().min(self.t_max);
+            self.best = Some(hit);
         }
     }
 }
 
 /// The search for any hit.
 struct AnySearch<'a, 'm, D, W> {
-    block: Finished<'m>,
-    level: &'a Level<'m>,
-    options: &'a QueryOptions,
+    world: &'a World<'a, 'm>,
     ray: &'a Ray,
     hit: bool,
     watch: W,
     decide: PhantomData<D>,
 }
 
-impl<D: Decide, W: Watch> Search for AnySearch<'_, '_, D, W> {
+impl<'a, 'm, D: Decide, W: Watch> Begin<'a, 'm> for AnySearch<'a, 'm, D, W> {
     #[inline(always)]
-    fn visit<S: Simd>(&mut self, s: S, instance: u32) -> Option<f32> {
-        if let Some((shown, ray)) =
-            Shown::at(self.block, self.level, instance, self.options, self.ray)
-        {
-            let question = AnyHit::<D, _>::new(shown.choice(self.options), self.watch.lend());
-            let mut room = [[0.0; 4]; 2];
-            self.hit = ask_by(s, shown.block, ray.settled(s, &mut room), question);
+    fn new(world: &'a World<'a, 'm>, ray: &'a Ray, watch: W) -> Self {
+        AnySearch { world, ray, hit: false, watch, decide: PhantomData }
+    }
+}
+
+impl<D: Decide, W: Watch> Search for AnySearch<'_, '_, D, W> {
+    type Watch = W;
+    type Found = bool;
+
+    #[inline(always)]
+    fn own<S: Simd>(&mut self, s: S) -> Option<f32> {
+        let own = Shown::own(self.world.block);
+        if !own.is_empty() {
+            let question = own.any_hit::<D, _>(self.world.options, self.watch.lend());
+            self.hit = ask_by(s, own.block, self.ray, question);
         }
         (!self.hit).then_some(self.ray.t_max)
+    }
+
+    #[inline(always)]
+    fn visit<S: Simd>(&mut self, s: S, instance: u32) -> Option<f32> {
+        let mut room = [0.0; 8];
+        if let Some((shown, record)) = self.world.shown(instance)
+            && let Some(ray) = record.object_ray_by(s, self.ray, self.ray.t_max, &mut room)
+        {
+            let question = shown.any_hit::<D, _>(self.world.options, self.watch.lend());
+            self.hit = ask_by(s, shown.block, ray, question);
+        }
+        (!self.hit).then_some(self.ray.t_max)
+    }
+
+    #[inline(always)]
+    fn found(mut self, steps: u64) -> bool {
+        self.watch.steps(steps);
+        self.hit
+    }
+}
+
+/// A block with instances, what belongs to these, and what is left of both.
+struct World<'a, 'm> {
+    block: Finished<'m>,
+    level: &'a Level<'m>,
+    options: &'a QueryOptions,
+}
+
+impl<'m> World<'_, 'm> {
+    /// What an instance shows, if the options leave it and there is something.
+    #[inline(always)]
+    fn shown(&self, instance: u32) -> Option<(Shown<'m>, &'m InstanceRecord)> {
+        Shown::of(self.level, instance, self.options).filter(|(shown, _)| !shown.is_empty())
+    }
+
+    /// Whether a hit of the ray comes before another one: at a smaller `t`, or at an equal one in an instance of a smaller number.
+    #[inline(always)]
+    fn is_before<D: Across>(&self, ray: &Ray, hit: &Hit, other: &Hit) -> bool {
+        hit.t < other.t || hit.t == other.t && self.wins_tie::<D>(ray, hit, other)
+    }
+
+    /// The same for hits at one rounded `t`.
+    #[cold]
+    #[inline(never)]
+    fn wins_tie<D: Across>(&self, ray: &Ray, hit: &Hit, other: &Hit) -> bool {
+        let both = self.best(ray, hit).zip(self.best(ray, other));
+        match both.map_or(Ordering::Equal, |(a, b)| D::order(&a, &b, self.options)) {
+            Ordering::Less => true,
+            Ordering::Greater => false,
+            // `NONE` comes before all numbers.
+            Ordering::Equal => hit.instance.wrapping_add(1) < other.instance.wrapping_add(1),
+        }
+    }
+
+    fn best(&self, ray: &Ray, hit: &Hit) -> Option<Best<'m>> {
+        if hit.instance == NONE {
+            return Some(Best { shown: Shown::own(self.block), ray: *ray });
+        }
+        let (shown, record) = self.shown(hit.instance)?;
+        Some(Best { shown, ray: record.object_ray(ray)? })
     }
 }
 
@@ -157,24 +238,6 @@ impl<'m> Shown<'m> {
         Some((Shown { block, instance }, record))
     }
 
-    /// That of an instance, or of none, if `options` leave something of it, and the ray in its space.
-    #[inline(always)]
-    fn at(
-        block: Finished<'m>,
-        level: &Level<'m>,
-        instance: u32,
-        options: &QueryOptions,
-        ray: &Ray,
-    ) -> Option<(Self, Ray)> {
-        let (shown, ray) = if instance == NONE {
-            (Shown::own(block), *ray)
-        } else {
-            let (shown, record) = Shown::of(level, instance, options)?;
-            (shown, record.object_ray(ray)?)
-        };
-        (!shown.is_empty()).then_some((shown, ray))
-    }
-
     /// Whether it has no primitives of its own.
     fn is_empty(&self) -> bool {
         self.block.header().counts.prim_ids == 0
@@ -186,31 +249,24 @@ impl<'m> Shown<'m> {
         let block = self.block.parts();
         Choice::new(options, self.instance, block.geometries, block.header.prim_limit)
     }
+
+    /// What to ask it for the closest hit.
+    #[inline(always)]
+    fn closest_hit<D, W>(&self, options: &QueryOptions, watch: W) -> ClosestHit<D, W, MEMORY> {
+        ClosestHit::new(self.choice(options), watch)
+    }
+
+    /// What to ask it for any hit.
+    #[inline(always)]
+    fn any_hit<D, W>(&self, options: &QueryOptions, watch: W) -> AnyHit<D, W> {
+        AnyHit::new(self.choice(options), watch)
+    }
 }
 
-/// The best hit so far, and the ray in whose space it is.
+/// Where a hit is, and the ray in whose space that is.
 pub(crate) struct Best<'m> {
-    hit: Hit,
     shown: Shown<'m>,
     ray: Ray,
-}
-
-impl Best<'_> {
-    /// Whether this comes first: at a smaller `t`, or at an equal one in an instance of a smaller number.
-    fn is_before<D: Across>(&self, other: &Best, options: &QueryOptions) -> bool {
-        match self.hit.t.partial_cmp(&other.hit.t) {
-            Some(Ordering::Less) => true,
-            Some(Ordering::Greater) | None => false,
-            Some(Ordering::Equal) => match D::order(self, other, options) {
-                Ordering::Less => true,
-                Ordering::Greater => false,
-                // `NONE` comes before all numbers.
-                Ordering::Equal => {
-                    self.hit.instance.wrapping_add(1) < other.hit.instance.wrapping_add(1)
-                }
-            },
-        }
-    }
 }
 
 /// How meetings of one rounded `t` on different lines are ordered.

@@ -22,7 +22,7 @@ pub(crate) fn visit_reached(
     mut counts: Option<&mut Counts>,
     visit: &mut Visit,
 ) {
-    let widening = widening(level, ray);
+    let widening = if is_calm(level, ray) { 0.0 } else { widening(level, ray) };
     // What is not a tree has its boxes in its cells, as wide as they are.
     if widening == 0.0 || level.index.header().kind == KIND_BVH {
         let widening = f32_above(widening);
@@ -40,8 +40,14 @@ pub(crate) fn visit_reached(
     visit_all(level, ray, widening, visit);
 }
 
+/// Whether the boxes of the index are wide enough for a ray from so far away.
+#[inline(always)]
+pub(super) fn is_calm(level: &Level, ray: &Ray) -> bool {
+    ray.origin.iter().all(|x| x.abs() <= level.head.calm)
+}
+
 /// By how much the boxes of the index must be wider for a ray from so far away.
-pub(super) fn widening(level: &Level, ray: &Ray) -> f64 {
+fn widening(level: &Level, ray: &Ray) -> f64 {
     let farthest = ray.origin.iter().fold(0.0f32, |farthest, x| farthest.max(x.abs()));
     let beyond = f64::from(farthest) - f64::from(level.head.calm);
     f64::from(level.head.spread) * beyond.max(0.0)

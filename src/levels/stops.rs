@@ -5,7 +5,7 @@
 
 use core::mem;
 
-use super::reach::{instance_of, visit_reached, widening};
+use super::reach::{instance_of, is_calm, visit_reached};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::level::Level;
 use crate::block::{Block, Bundles};
@@ -119,7 +119,7 @@ impl Gatherer<'_, '_> {
     #[inline(always)]
     fn alone<S: Simd>(&mut self, s: S, ray: &Ray, stops: &mut Stops) {
         if let Bundles::Sixteen(bundles) = self.index.bundles
-            && widening(self.level, ray) == 0.0
+            && is_calm(self.level, ray)
             && let Some((late, slab)) = ray.set_out(s, self.index.header.reach)
             && self.found.all(s, bundles, &slab.wide::<S, 16>(s), late.t_max)
         {
@@ -137,7 +137,7 @@ impl Gatherer<'_, '_> {
     #[inline(always)]
     fn together<S: Simd>(&mut self, s: S, alike: Alike, rays: &[Ray], stops: &mut [Stops]) -> bool {
         let Bundles::Sixteen(bundles) = self.index.bundles else { return false };
-        if rays.iter().any(|ray| widening(self.level, ray) != 0.0) {
+        if !rays.iter().all(|ray| is_calm(self.level, ray)) {
             return false;
         }
         let packet = self.packet.get_or_insert_with(|| RayPacket::new(alike));

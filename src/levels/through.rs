@@ -1,6 +1,7 @@
 //! One ray through the index, and into each instance that it comes to.
 
-use super::reach::{Reach, instance_of, visit_reached, widening};
+use super::World;
+use super::reach::{Reach, instance_of, is_calm, visit_reached};
 use crate::block::Bundles;
 use crate::block::level::Level;
 use crate::bvh::{Columns, ENOUGH_ROOM, Walk};
@@ -9,85 +10,120 @@ use crate::query::{Counts, Watch};
 use crate::ray::{Ray, Slab};
 use crate::simd::{self, Kernel, Simd, Width};
 
-/// What is looked for in instances.
-pub(super) trait Search {
-    /// Looks into an instance. A limit of `t` of what is still of interest, or `None` to end the search.
+/// What is looked for.
+pub(super) trait Search: Sized {
+    type Watch: Watch;
+    type Found;
+
+    /// Looks among the primitives that are in no instance. A limit of `t` of what is still of interest, or `None` to end the
+    /// search.
+    fn own<S: Simd>(&mut self, s: S) -> Option<f32>;
+
+    /// Looks into an instance, likewise.
     fn visit<S: Simd>(&mut self, s: S, instance: u32) -> Option<f32>;
+
+    /// What was found, after so many boxes and cells of the index.
+    fn found(self, steps: u64) -> Self::Found;
 }
 
-/// Lets `search` visit each instance whose rounded ray may hit something, near ones first as far as the index is a tree.
+/// A search that can begin.
+pub(super) trait Begin<'a, 'm>: Search {
+    /// Nothing looked at yet.
+    fn new(world: &'a World<'a, 'm>, ray: &'a Ray, watch: Self::Watch) -> Self;
+}
+
+/// What a search finds in what is in no instance and in each instance whose rounded ray may hit something, near ones first as
+/// far as the index is a tree.
 ///
-/// For the layout that is chosen automatically this is one piece of code from the ray to the question; others go the way
-/// that is there for all questions.
-pub(super) fn visit_by<W: Watch>(
+/// For the layout that is chosen automatically this is one piece of code from the ray to the answer, which stays in registers
+/// on the way; others go the way that is there for all questions.
+#[inline(always)]
+pub(super) fn through<'a, 'm, T: Begin<'a, 'm>>(
+    world: &'a World<'a, 'm>,
+    ray: &'a Ray,
+    watch: T::Watch,
+) -> T::Found {
+    simd::dispatch(Through::<T> { world, ray, watch })
+}
+
+/// A search that has not begun: made here, it would go through memory.
+struct Through<'a, 'm, T: Search> {
+    world: &'a World<'a, 'm>,
+    ray: &'a Ray,
+    watch: T::Watch,
+}
+
+impl<'a, 'm, T: Begin<'a, 'm>> Kernel for Through<'a, 'm, T> {
+    type Output = T::Found;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> T::Found {
+        let Through { world, ray, watch } = self;
+        let (level, mut search) = (world.level, T::new(world, ray, watch));
+        let Some(limit) = search.own(s) else { return search.found(0) };
+        if !T::Watch::COUNTS && S::FLIES && walk(s, level, ray, limit, &mut search).is_some() {
+            return search.found(0);
+        }
+        any_way(level, &Ray { t_max: limit, ..*ray }, search)
+    }
+}
+
+/// Visits instances, near ones first. The answer is `None` if this is no ray or no index for it; then nothing was visited.
+#[inline(always)]
+fn walk<S: Simd>(
+    s: S,
     level: &Level,
     ray: &Ray,
+    limit: f32,
     search: &mut impl Search,
-    counts: &mut Counts,
-) {
-    if !W::COUNTS && simd::dispatch(Through { level, ray, search }).is_some() {
-        return;
+) -> Option<()> {
+    let index = &level.index.parts();
+    let Bundles::Sixteen(bundles) = index.bundles else { return None };
+    if !is_calm(level, ray) {
+        return None;
     }
-    let counts = W::COUNTS.then_some(counts);
-    visit_reached(level, ray, counts, &mut |instance| visit(search, instance));
+    let (late, slab) = ray.set_out(s, index.header.reach)?;
+    let (boxes, t_scale) = (slab.wide::<S, 16>(s), late.t_scale());
+    let in_frame = |limit: f32| f32_above(f64::from(limit) * t_scale);
+    let t_bound = if limit < ray.t_max { in_frame(limit) } else { late.t_max };
+    let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
+    let mut walk = Walk::new(&mut columns, t_bound);
+    loop {
+        let t_bounds = Width::<16>::splat(s, walk.t_bound());
+        while !walk.at().is_leaf() {
+            let bundle = bundles.get(walk.at().bundle_number());
+            let entered = bundle.is_some_and(|bundle| {
+                walk.enter::<S, Reach<'_, '_, '_, ()>, 16>(s, bundle, &boxes, t_bounds)
+            });
+            if !entered {
+                return Some(());
+            }
+        }
+        let Some(instance) = instance_of(index, walk.at()) else { return Some(()) };
+        let Some(limit) = search.visit(s, instance) else { return Some(()) };
+        walk.leave::<S, Reach<'_, '_, '_, ()>>(s, in_frame(limit));
+    }
 }
 
-/// Lets `search` visit one instance. Out of line: where there are no vectors all of the question is compiled into it.
+/// The same for any ray and any index.
+#[cold]
 #[inline(never)]
-pub(super) fn visit(search: &mut impl Search, instance: u32) -> Option<f32> {
-    simd::dispatch(Visit { search, instance })
+fn any_way<T: Search>(level: &Level, ray: &Ray, mut search: T) -> T::Found {
+    let mut counts = Counts::default();
+    let counted = T::Watch::COUNTS.then_some(&mut counts);
+    visit_reached(level, ray, counted, &mut |instance| {
+        simd::dispatch(Visit(&mut search, instance))
+    });
+    search.found(counts.steps)
 }
 
-struct Visit<'a, T> {
-    search: &'a mut T,
-    instance: u32,
-}
+struct Visit<'s, T>(&'s mut T, u32);
 
 impl<T: Search> Kernel for Visit<'_, T> {
     type Output = Option<f32>;
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Option<f32> {
-        self.search.visit(s, self.instance)
-    }
-}
-
-/// The answer is `None` if this is no ray or no index for it; then nothing was visited.
-struct Through<'a, 'm, T> {
-    level: &'a Level<'m>,
-    ray: &'a Ray,
-    search: &'a mut T,
-}
-
-impl<T: Search> Kernel for Through<'_, '_, T> {
-    type Output = Option<()>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, s: S) -> Option<()> {
-        let Through { level, ray, search } = self;
-        let index = &level.index.parts();
-        let Bundles::Sixteen(bundles) = index.bundles else { return None };
-        if !S::FLIES || widening(level, ray) > 0.0 {
-            return None;
-        }
-        let (late, slab) = ray.set_out(s, index.header.reach)?;
-        let (boxes, t_scale) = (slab.wide::<S, 16>(s), late.t_scale());
-        let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
-        let mut walk = Walk::new(&mut columns, late.t_max);
-        loop {
-            let t_bounds = Width::<16>::splat(s, walk.t_bound());
-            while !walk.at().is_leaf() {
-                let bundle = bundles.get(walk.at().bundle_number());
-                let entered = bundle.is_some_and(|bundle| {
-                    walk.enter::<S, Reach<'_, '_, '_, ()>, 16>(s, bundle, &boxes, t_bounds)
-                });
-                if !entered {
-                    return Some(());
-                }
-            }
-            let Some(instance) = instance_of(index, walk.at()) else { return Some(()) };
-            let Some(limit) = search.visit(s, instance) else { return Some(()) };
-            walk.leave::<S, Reach<'_, '_, '_, ()>>(s, f32_above(f64::from(limit) * t_scale));
-        }
+        self.0.visit(s, self.1)
     }
 }

@@ -8,10 +8,10 @@ use core::{iter, mem, slice};
 
 use super::manner::{are_small, are_unlike, manner_of};
 use super::stops::{CHUNK, Gather, Stops};
-use super::{Best, Shown, any, closest};
+use super::{Shown, World, any, closest};
 use crate::batch::{self, Record};
 use crate::block::Finished;
-use crate::block::level::{InstanceRecord, Level};
+use crate::block::level::InstanceRecord;
 use crate::query::{Choice, Exact, QueryOptions};
 use crate::ray::{Hit, NONE, Ray};
 use crate::simd::{self, Kernel, Simd};
@@ -56,7 +56,7 @@ trait Asked {
     fn limit(answer: &Self::Answer, ray: &Ray) -> Option<f32>;
 
     /// Takes in what a ray met in an instance.
-    fn take(chunk: &Chunk, ray: &Ray, instance: u32, met: Self::Answer, answer: &mut Self::Answer);
+    fn take(world: &World, ray: &Ray, instance: u32, met: Self::Answer, answer: &mut Self::Answer);
 
     fn alone(block: Finished, ray: &Ray, options: &QueryOptions) -> Self::Answer;
 }
@@ -80,10 +80,9 @@ impl Asked for Nearest {
         Some(if above < ray.t_max { above } else { ray.t_max })
     }
 
-    fn take(chunk: &Chunk, ray: &Ray, instance: u32, met: Hit, answer: &mut Hit) {
+    fn take(world: &World, ray: &Ray, instance: u32, met: Hit, answer: &mut Hit) {
         let hit = Hit { instance, ..met };
-        let ties = hit.t == answer.t && hit.prim != NONE;
-        if hit.t < answer.t || ties && chunk.is_before(ray, &hit, answer) {
+        if hit.prim != NONE && world.is_before::<Exact>(ray, &hit, answer) {
             *answer = hit;
         }
     }
@@ -111,7 +110,7 @@ impl Asked for Whether {
         (!answer).then_some(ray.t_max)
     }
 
-    fn take(_: &Chunk, _: &Ray, _: u32, met: bool, answer: &mut bool) {
+    fn take(_: &World, _: &Ray, _: u32, met: bool, answer: &mut bool) {
         *answer |= met;
     }
 
@@ -127,7 +126,7 @@ fn of_each<A: Asked>(
     answers: &mut [A::Answer],
 ) {
     let Some(level) = &block.level() else { return };
-    let (chunk, flies) = (Chunk { block, level, options }, simd::dispatch(Flies));
+    let (chunk, flies) = (Chunk(World { block, level, options }), simd::dispatch(Flies));
     let cached = are_small(level);
     for (rays, answers) in rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)) {
         if flies && !(cached && are_unlike(rays)) {
@@ -152,11 +151,7 @@ impl Kernel for Flies {
 }
 
 /// Where the rays of a chunk are traced.
-struct Chunk<'a, 'm> {
-    block: Finished<'m>,
-    level: &'a Level<'m>,
-    options: &'a QueryOptions,
-}
+struct Chunk<'a, 'm>(World<'a, 'm>);
 
 impl<'m> Chunk<'_, 'm> {
     /// Answers for up to [`CHUNK`] rays, as many as both slices have.
@@ -167,15 +162,16 @@ impl<'m> Chunk<'_, 'm> {
         let count = rays.len().min(answers.len()).min(CHUNK);
         let (rays, answers) = (&rays[..count], &mut answers[..count]);
         answers.fill(A::NOTHING);
-        let own = Shown::own(self.block);
+        let World { block, level, options } = self.0;
+        let own = Shown::own(block);
         if !own.is_empty() {
-            batch::ask_all(own.block, rays, answers, A::question(own.choice(self.options)));
+            batch::ask_all(own.block, rays, answers, A::question(own.choice(options)));
         }
         let mut limited = [NO_RAY; CHUNK];
         let limited = &mut limited[..count];
         limit::<A>(rays, answers, limited);
         let mut stops = [Stops::NONE; CHUNK];
-        simd::dispatch(Gather { level: self.level, rays: limited, stops: &mut stops });
+        simd::dispatch(Gather { level, rays: limited, stops: &mut stops });
         let (mut turns, mut room) = ([NONE; CHUNK], Room::new::<A>());
         while self.take_turns(limited, &mut stops, &mut turns) {
             while self.visit::<A>(&mut turns, limited, &mut room, answers) {}
@@ -197,8 +193,7 @@ impl<'m> Chunk<'_, 'm> {
     ) -> bool {
         let mut any = false;
         for ((ray, stops), turn) in rays.iter().zip(stops).zip(turns) {
-            let seen =
-                |instance: &u32| self.shown(*instance).is_some_and(|(shown, _)| !shown.is_empty());
+            let seen = |instance: &u32| self.0.shown(*instance).is_some();
             *turn = iter::from_fn(|| stops.next(ray.t_max)).find(seen).unwrap_or(NONE);
             any |= *turn != NONE;
         }
@@ -215,16 +210,16 @@ impl<'m> Chunk<'_, 'm> {
         answers: &mut [A::Answer],
     ) -> bool {
         let first = turns.iter().copied().find(|turn| *turn != NONE);
-        let Some((shown, of_first)) = first.and_then(|instance| self.shown(instance)) else {
+        let Some((shown, of_first)) = first.and_then(|instance| self.0.shown(instance)) else {
             return false;
         };
         let goes_along = |instance: u32, record: &InstanceRecord| {
-            let alike = shown.instance == instance || self.options.skip.is_none();
+            let alike = shown.instance == instance || self.0.options.skip.is_none();
             record.child == of_first.child && alike
         };
         let mut count = 0;
         for (i, (ray, turn)) in given.iter().zip(turns).enumerate() {
-            let place = self.shown(*turn).filter(|(_, record)| goes_along(*turn, record));
+            let place = self.0.shown(*turn).filter(|(_, record)| goes_along(*turn, record));
             let Some((_, record)) = place else { continue };
             let instance = mem::replace(turn, NONE);
             if let Some(ray) = record.object_ray(ray) {
@@ -236,7 +231,7 @@ impl<'m> Chunk<'_, 'm> {
         let met = &mut room.met[..count];
         self.ask_child::<A>(&shown, rays, who, met);
         for (met, who) in met.iter().zip(who) {
-            A::take(self, &given[who.ray], who.instance, *met, &mut answers[who.ray]);
+            A::take(&self.0, &given[who.ray], who.instance, *met, &mut answers[who.ray]);
         }
         true
     }
@@ -249,17 +244,13 @@ impl<'m> Chunk<'_, 'm> {
         who: &[Traveller],
         met: &mut [A::Answer],
     ) {
-        let question = A::question(shown.choice(self.options));
+        let question = A::question(shown.choice(self.0.options));
         if rays.len() < FEW {
             batch::ask_each(shown.block, rays, met, question);
         } else {
             let manner = manner_of(shown.block, rays, who, A::FAR);
             batch::ask_in(manner, shown.block, rays, met, question);
         }
-    }
-
-    fn shown(&self, instance: u32) -> Option<(Shown<'m>, &'m InstanceRecord)> {
-        Shown::of(self.level, instance, self.options)
     }
 
     /// Answers for each ray by itself if it has something to look for up to a limit of which `wanted` says so.
@@ -271,25 +262,9 @@ impl<'m> Chunk<'_, 'm> {
     ) {
         for (ray, answer) in rays.iter().zip(answers) {
             if A::limit(answer, ray).is_some_and(&wanted) {
-                *answer = A::alone(self.block, ray, self.options);
+                *answer = A::alone(self.0.block, ray, self.0.options);
             }
         }
-    }
-
-    /// Whether of two hits at one rounded `t` the first comes before the second.
-    #[cold]
-    fn is_before(&self, ray: &Ray, hit: &Hit, other: &Hit) -> bool {
-        let both = self.best(ray, hit).zip(self.best(ray, other));
-        both.is_some_and(|(hit, other)| hit.is_before::<Exact>(&other, self.options))
-    }
-
-    fn best(&self, ray: &Ray, hit: &Hit) -> Option<Best<'m>> {
-        if hit.instance == NONE {
-            let own = Best { hit: *hit, shown: Shown::own(self.block), ray: *ray };
-            return (hit.prim != NONE).then_some(own);
-        }
-        let (shown, record) = self.shown(hit.instance)?;
-        Some(Best { hit: *hit, shown, ray: record.object_ray(ray)? })
     }
 }
 

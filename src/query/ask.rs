@@ -2,7 +2,6 @@
 
 use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
 use crate::ray::PreparedRay;
-use crate::simd::SMALL;
 
 /// The closest hit: least `t`, and of equal ones the first primitive.
 ///
@@ -30,9 +29,9 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     /// In line where room is no matter.
     #[cfg_attr(target_pointer_width = "64", inline(always))]
     #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
-    fn consider(&mut self, ray: &PreparedRay, met: &D::Met) {
+    fn consider(&mut self, ray: &PreparedRay, met: &D::Met, in_doubt: bool) {
         // Asked here, real arithmetic does not stand on the stack above what found the meeting.
-        if SMALL && !D::is_met(ray, met, &mut self.watch) {
+        if in_doubt && !D::is_met(ray, met, &mut self.watch) {
             return;
         }
         if !self.filter.faces(met.front()) {
@@ -76,13 +75,9 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         };
         if !known
             && self.filter.sees(lane.place, true)
-            && let Some(met) = &if SMALL {
-                D::likely(ray, lane, &mut self.watch)
-            } else {
-                D::triangle(ray, lane, &mut self.watch)
-            }
+            && let Some((met, in_doubt)) = &D::likely(ray, lane, &mut self.watch)
         {
-            self.consider(ray, met);
+            self.consider(ray, met, *in_doubt);
         }
         false
     }
@@ -91,7 +86,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         if self.filter.sees(lane.place, false) {
             for met in D::sphere(ray, lane, &mut self.watch).into_iter().flatten() {
                 if self.filter.sees(lane.place, met.skippable()) {
-                    self.consider(ray, &met);
+                    self.consider(ray, &met, false);
                 }
             }
         }

@@ -30,8 +30,6 @@ pub(crate) struct ExactMet {
     place: Place,
     front: bool,
     skippable: bool,
-    /// Whether only real arithmetic can tell if it is within the ray's limits.
-    in_doubt: bool,
 }
 
 impl Meets for ExactMet {
@@ -218,9 +216,9 @@ impl Exact {
                 front: root == 0,
                 // A line that only touches meets front and back in one point.
                 skippable: both.touches || root == both.nearest,
-                in_doubt: in_doubt(ray, interval(t, t_error))?,
             };
-            Exact::is_met(ray, &met, watch).then_some(met)
+            let in_doubt = in_doubt(ray, interval(t, t_error))?;
+            (!in_doubt || Exact::is_met(ray, &met, watch)).then_some(met)
         })
     }
 }
@@ -233,7 +231,11 @@ impl Decide for Exact {
     /// In line where room is no matter.
     #[cfg_attr(target_pointer_width = "64", inline(always))]
     #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
-    fn likely(ray: &PreparedRay, lane: &TriangleLane, watch: &mut impl Watch) -> Option<ExactMet> {
+    fn likely(
+        ray: &PreparedRay,
+        lane: &TriangleLane,
+        watch: &mut impl Watch,
+    ) -> Option<(ExactMet, bool)> {
         watch.interval();
         let clear = match lane.sure {
             true if !SMALL => triangle::clear_plane(&ray.line(), &lane.corners()),
@@ -247,7 +249,7 @@ impl Decide for Exact {
             watch.exact();
         }
         let in_doubt = in_doubt(ray, interval(met.t, met.t_error))?;
-        Some(ExactMet {
+        let met = ExactMet {
             t: met.t,
             t_error: met.t_error,
             weights: [met.weights[0] as f32, met.weights[1] as f32],
@@ -256,15 +258,12 @@ impl Decide for Exact {
             place: lane.place,
             front: met.front,
             skippable: true,
-            in_doubt,
-        })
+        };
+        Some((met, in_doubt))
     }
 
     #[inline(always)]
     fn is_met(ray: &PreparedRay, met: &ExactMet, watch: &mut impl Watch) -> bool {
-        if !met.in_doubt {
-            return true;
-        }
         watch.exact();
         // What only a copy of is lent out of line can stay in registers, and what is written to memory by parts is slow to
         // read as a whole. Where room is scarce there is no copy, here and below.

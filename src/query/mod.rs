@@ -195,14 +195,18 @@ pub(crate) trait Decide {
         lane: &TriangleLane,
         watch: &mut impl Watch,
     ) -> Option<Self::Met> {
-        let met = Self::likely(ray, lane, watch)?;
-        Self::is_met(ray, &met, watch).then_some(met)
+        let (met, in_doubt) = Self::likely(ray, lane, watch)?;
+        (!in_doubt || Self::is_met(ray, &met, watch)).then_some(met)
     }
 
-    /// The same, if [`is_met`](Self::is_met) says so.
-    fn likely(ray: &PreparedRay, lane: &TriangleLane, watch: &mut impl Watch) -> Option<Self::Met>;
+    /// The same, and whether it is in doubt: then [`is_met`](Self::is_met) tells.
+    fn likely(
+        ray: &PreparedRay,
+        lane: &TriangleLane,
+        watch: &mut impl Watch,
+    ) -> Option<(Self::Met, bool)>;
 
-    /// Whether what is likely is so.
+    /// Whether what is in doubt is within the ray's limits.
     #[inline(always)]
     fn is_met(_ray: &PreparedRay, _met: &Self::Met, _watch: &mut impl Watch) -> bool {
         true

@@ -45,19 +45,24 @@ impl Decide for Watertight {
     const ANY_BOXES: bool = false;
     type Memory = ();
 
-    fn likely(ray: &PreparedRay, lane: &TriangleLane, _: &mut impl Watch) -> Option<WatertightMet> {
+    fn likely(
+        ray: &PreparedRay,
+        lane: &TriangleLane,
+        _: &mut impl Watch,
+    ) -> Option<(WatertightMet, bool)> {
         let detail = sieve::detail(ray, lane.corners());
         if detail.t + detail.t_error < ray.t_min || detail.t - detail.t_error > ray.t_max {
             return None;
         }
-        Some(WatertightMet {
+        let met = WatertightMet {
             t: limited(detail.t, ray.t_min, ray.t_max),
             weights: detail.weights,
             place: lane.place,
             front: detail.front,
             root: 0,
             skippable: true,
-        })
+        };
+        Some((met, false))
     }
 
     fn sphere(

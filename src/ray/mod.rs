@@ -12,11 +12,9 @@ mod slab;
 pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
-pub(crate) use frame::{Early, Late, PreparedRay, TINY};
+pub(crate) use frame::{Early, Late, Passing, PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, RayPacket, Spread};
 pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
-
-use crate::simd::{Lanes, Simd, Width};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".
 pub const NONE: u32 = u32::MAX;
@@ -59,15 +57,12 @@ impl Ray {
         unsafe { &*core::ptr::from_ref(self).cast() }
     }
 
-    /// The same ray in memory that vectors have written, to be read by vectors soon: from parts that is slow.
+    /// The ray with these numbers.
     #[allow(unsafe_code, reason = "a promise about the layout drawn here")]
     #[inline(always)]
-    pub(crate) fn settled<'r, S: Simd>(&self, s: S, room: &'r mut [[f32; 4]; 2]) -> &'r Ray {
-        for (half, to) in self.rows().iter().zip(&mut *room) {
-            Width::<4>::load(s, half).store(to);
-        }
+    pub(crate) fn of_row(row: &[f32; 8]) -> &Self {
         // SAFETY: as for `row`.
-        unsafe { &*core::ptr::from_ref(room).cast() }
+        unsafe { &*core::ptr::from_ref(row).cast() }
     }
 
     /// Its halves, each a vector on most machines.

@@ -14,6 +14,14 @@ pub(crate) trait Doubles: Copy {
     fn less(self, other: Self) -> u32;
 }
 
+/// Eight doubles as two halves of four: three numbers each, and one beside them.
+pub(crate) trait Halves: Doubles {
+    /// The first, the second and the third number of each half, each in all of its lanes.
+    fn spread(self) -> [Self; 3];
+    /// With what is beside the first three in `first`, and with `second` beside the other three.
+    fn beside(self, first: Self, second: f64) -> Self;
+}
+
 impl Doubles for f64 {
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -87,6 +95,17 @@ impl Doubles for [f64; 8] {
     }
 }
 
+impl Halves for [f64; 8] {
+    fn spread(self) -> [Self; 3] {
+        [0, 1, 2].map(|k| core::array::from_fn(|i| self[i / 4 * 4 + k]))
+    }
+
+    fn beside(self, first: Self, second: f64) -> Self {
+        let [a, b, c, _, d, e, f, _] = self;
+        [a, b, c, first[3], d, e, f, second]
+    }
+}
+
 /// The doubles of a backend that has none of its own.
 macro_rules! doubles_one_by_one {
     () => {
@@ -98,6 +117,10 @@ macro_rules! doubles_one_by_one {
 
         fn narrowed(self, doubles: [f64; 8]) -> [f32; 8] {
             doubles.map(|x| x as f32)
+        }
+
+        fn twice(self, four: &[f64; 4]) -> [f64; 8] {
+            core::array::from_fn(|i| four[i % 4])
         }
     };
 }

@@ -38,7 +38,7 @@ mod tests;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, Ordering};
 
-pub(crate) use doubles::Doubles;
+pub(crate) use doubles::{Doubles, Halves};
 pub(crate) use scalar::Scalar;
 
 /// Whether code had better be small than fast: where there are no vectors, lanes go one by one and questions share their
@@ -193,7 +193,10 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     const FLIES: bool = false;
 
     /// Eight doubles.
-    type Doubles: Doubles;
+    type Doubles: Halves;
+
+    /// The same four in both halves.
+    fn twice(self, four: &[f64; 4]) -> Self::Doubles;
 
     /// Floats as doubles.
     fn widened(self, floats: &[f32; 8]) -> Self::Doubles;

@@ -271,6 +271,12 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    fn twice(self, four: &[f64; 4]) -> D44 {
+        // SAFETY: the token proves that the instructions exist.
+        unsafe { D44::twice(four) }
+    }
+
+    #[inline(always)]
     fn corners(self, table: Two<F8>, list: &[u8; 8]) -> Two<F8> {
         // SAFETY: the token proves AVX2.
         unsafe {

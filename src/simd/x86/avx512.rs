@@ -273,6 +273,12 @@ impl Simd for Avx512 {
     }
 
     #[inline(always)]
+    fn twice(self, four: &[f64; 4]) -> D8 {
+        // SAFETY: the token proves that the instructions exist.
+        unsafe { D8::twice(four) }
+    }
+
+    #[inline(always)]
     fn corners(self, table: F16, list: &[u8; 8]) -> F16 {
         const SHIFTS: [i32; 16] = [0, 0, 4, 4, 8, 8, 12, 12, 16, 16, 20, 20, 24, 24, 28, 28];
         // SAFETY: the token proves AVX-512 F. A permutation looks at the four lowest bits only.

@@ -7,7 +7,7 @@
 
 use core::arch::x86_64::*;
 
-use crate::simd::doubles::Doubles;
+use crate::simd::doubles::{Doubles, Halves};
 
 /// In one register of AVX-512: such a value is made from a token, so the instructions exist.
 #[derive(Clone, Copy)]
@@ -25,6 +25,15 @@ impl D8 {
     pub unsafe fn widened(floats: &[f32; 8]) -> Self {
         // SAFETY: the caller's promise; the array has eight floats.
         D8(unsafe { _mm512_cvtps_pd(_mm256_loadu_ps(floats.as_ptr())) })
+    }
+
+    /// # Safety
+    ///
+    /// The processor has AVX-512 F.
+    #[inline(always)]
+    pub unsafe fn twice(four: &[f64; 4]) -> Self {
+        // SAFETY: the caller's promise; the array has four doubles.
+        D8(unsafe { _mm512_broadcast_f64x4(_mm256_loadu_pd(four.as_ptr())) })
     }
 
     #[inline(always)]
@@ -69,6 +78,29 @@ impl Doubles for D8 {
     }
 }
 
+impl Halves for D8 {
+    #[inline(always)]
+    fn spread(self) -> [Self; 3] {
+        // SAFETY: a value of this type proves AVX-512 F.
+        unsafe {
+            [
+                D8(_mm512_permutex_pd::<0x00>(self.0)),
+                D8(_mm512_permutex_pd::<0x55>(self.0)),
+                D8(_mm512_permutex_pd::<0xAA>(self.0)),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn beside(self, first: Self, second: f64) -> Self {
+        // SAFETY: as above.
+        D8(unsafe {
+            let one = _mm512_mask_mov_pd(self.0, 1 << 3, first.0);
+            _mm512_mask_mov_pd(one, 1 << 7, _mm512_set1_pd(second))
+        })
+    }
+}
+
 /// Operations of one instruction a half.
 macro_rules! in_halves {
     ($($name:ident: $instruction:ident;)*) => {
@@ -94,6 +126,15 @@ impl D44 {
         D44(unsafe {
             [_mm256_cvtps_pd(_mm_loadu_ps(first)), _mm256_cvtps_pd(_mm_loadu_ps(first.add(4)))]
         })
+    }
+
+    /// # Safety
+    ///
+    /// The processor has AVX2.
+    #[inline(always)]
+    pub unsafe fn twice(four: &[f64; 4]) -> Self {
+        // SAFETY: the caller's promise; the array has four doubles.
+        D44([unsafe { _mm256_loadu_pd(four.as_ptr()) }; 2])
     }
 
     #[inline(always)]
@@ -155,5 +196,29 @@ impl Doubles for D44 {
             let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a, c));
             (low | _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(b, d)) << 4) as u32
         }
+    }
+}
+
+impl Halves for D44 {
+    #[inline(always)]
+    fn spread(self) -> [Self; 3] {
+        let [low, high] = self.0;
+        // SAFETY: a value of this type proves AVX2.
+        unsafe {
+            [
+                D44([_mm256_permute4x64_pd::<0x00>(low), _mm256_permute4x64_pd::<0x00>(high)]),
+                D44([_mm256_permute4x64_pd::<0x55>(low), _mm256_permute4x64_pd::<0x55>(high)]),
+                D44([_mm256_permute4x64_pd::<0xAA>(low), _mm256_permute4x64_pd::<0xAA>(high)]),
+            ]
+        }
+    }
+
+    #[inline(always)]
+    fn beside(self, first: Self, second: f64) -> Self {
+        let ([low, high], [beside, _]) = (self.0, first.0);
+        // SAFETY: as above.
+        D44(unsafe {
+            [_mm256_blend_pd::<8>(low, beside), _mm256_blend_pd::<8>(high, _mm256_set1_pd(second))]
+        })
     }
 }
