@@ -168,7 +168,8 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
         return Err(OpenError::Misaligned);
     }
     let Some(header) = storage::view::<Header>(bytes, 0, 1).and_then(<[_]>::first) else {
-        let begins_right = bytes.iter().zip(&MAGIC).all(|(byte, letter)| byte == letter);
+        let right = |(i, letter): (usize, &u8)| bytes.get(i).is_none_or(|byte| byte == letter);
+        let begins_right = MAGIC.iter().enumerate().all(right);
         return Err(if begins_right { OpenError::Truncated } else { OpenError::NotABlock });
     };
     // As numbers: else it would be a call.

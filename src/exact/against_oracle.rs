@@ -118,24 +118,43 @@ impl Compact {
 fn judge_compact(lines: &[Line], meetings: &[Meeting], limits: &[f32], seed: &str) {
     let mut met = Vec::new();
     for (line, meeting) in lines.iter().flat_map(|l| meetings.iter().map(move |m| (l, m))) {
-        let place = || std::format!("compact, {seed}: {line:?} {meeting:?}");
+        let place = std::format!("compact, {seed}: {line:?} {meeting:?}");
         let (ours, real) = (Compact::new(line, meeting), oracle_root(line, meeting));
-        assert_eq!(ours.is_some(), real.is_some(), "{}", place());
+        assert_eq!(ours.is_some(), real.is_some(), "{place}");
         let Some((ours, real)) = ours.zip(real) else { continue };
         for limit in limits {
             let order = real.cmp(&RealRoot::float(*limit));
-            assert_eq!(
-                ours.compare_with_float(Binary::of(*limit)),
-                order,
-                "limit {limit:e}, {}",
-                place()
-            );
+            let found = ours.compare_with_float(Binary::of(*limit));
+            assert_eq!(found, order, "limit {limit:e}, {place}");
         }
-        judge_size(ours.approximate(), &real, &place());
-        for (other, other_real) in &met {
-            assert_eq!(ours.compare(other), real.cmp(other_real), "{}", place());
+        judge_size(ours.approximate(), &real, &place);
+        for (_, _, other, other_real) in &met {
+            assert_eq!(ours.compare(other), real.cmp(other_real), "{place}");
         }
-        met.push((ours, real));
+        for (_, other, _, other_real) in met.iter().filter(|(of, ..)| core::ptr::eq(*of, line)) {
+            let order = compact::order(line, meeting, other);
+            assert_eq!(order, Some(real.cmp(other_real)), "{place}");
+        }
+        judge_lent(line, meeting, &real, limits, &place);
+        met.push((line, *meeting, ours, real));
+    }
+}
+
+/// What is asked of a meeting that is lent.
+fn judge_lent(line: &Line, meeting: &Meeting, real: &RealRoot, limits: &[f32], place: &str) {
+    let ends = [f32::NEG_INFINITY, f32::INFINITY];
+    let limits = || limits.iter().chain(&ends).chain(limits).copied();
+    for (low, high) in limits().zip(limits().skip(1)) {
+        let order = |limit: f32| match limit.is_finite() {
+            true => real.cmp(&RealRoot::float(limit)),
+            false => 0.0f32.total_cmp(&limit),
+        };
+        let expected = order(low).is_ge() && order(high).is_le();
+        let within = compact::is_within(line, meeting, [low, high]);
+        assert_eq!(within, expected, "within {low:e} and {high:e}, {place}");
+    }
+    if let Meeting::Triangle(corners) = meeting {
+        judge_size(compact::to_plane(line, corners).expect("it is met"), real, place);
     }
 }
 

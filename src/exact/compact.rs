@@ -15,11 +15,14 @@ use crate::math::rounding::UNIT;
 /// Adds `x . (p x q)`, or subtracts it.
 #[inline(never)]
 fn add_volume(sum: &mut Fixed, x: &[f32; 3], p: &[f32; 3], q: &[f32; 3], minus: bool) {
-    for (k, x) in x.iter().enumerate() {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        sum.add_product(*x, p[i], q[j], minus);
-        sum.add_product(*x, p[j], q[i], !minus);
-    }
+    let ([x, y, z], [px, py, pz], [qx, qy, qz]) = (x, p, q);
+    let mut add = |x: &f32, p: &f32, q: &f32, minus| sum.add_product(x, p, q, minus);
+    add(x, py, qz, minus);
+    add(x, pz, qy, !minus);
+    add(y, pz, qx, minus);
+    add(y, px, qz, !minus);
+    add(z, px, qy, minus);
+    add(z, py, qx, !minus);
 }
 
 /// Adds a ring, or subtracts it. In line: numbers that are summed up lie deep in the stack.

@@ -175,8 +175,10 @@ impl InstanceRecord {
     /// leaves the range of `f32`, or the direction becomes zero: then the instance is not hit.
     #[inline(always)]
     pub fn object_ray(&self, ray: &Ray) -> Option<Ray> {
-        let m = &self.object_to_world;
-        let o = [0, 1, 2].map(|k| f64::from(ray.origin[k]) - f64::from(m[4 * k + 3]));
+        let [_, _, _, shift_x, _, _, _, shift_y, _, _, _, shift_z] = self.object_to_world;
+        let from = |x: f32, shift: f32| f64::from(x) - f64::from(shift);
+        let [x, y, z] = ray.origin;
+        let o = [from(x, shift_x), from(y, shift_y), from(z, shift_z)];
         let d = ray.direction.map(f64::from);
         let mapped =
             |v: [f64; 3]| self.inverse().map(|[x, y, z]| ((x * v[0] + y * v[1]) + z * v[2]) as f32);

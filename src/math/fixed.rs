@@ -31,8 +31,8 @@ impl Fixed {
 
     /// Adds the product of three floats, or subtracts it.
     #[inline(never)]
-    pub fn add_product(&mut self, x: f32, y: f32, z: f32, minus: bool) {
-        let (x, y, z) = (Binary::of(x), Binary::of(y), Binary::of(z));
+    pub fn add_product(&mut self, x: &f32, y: &f32, z: &f32, minus: bool) {
+        let (x, y, z) = (Binary::of(*x), Binary::of(*y), Binary::of(*z));
         let minus = minus ^ ((x.mantissa ^ y.mantissa ^ z.mantissa) < 0);
         let size = u64::from(x.mantissa.unsigned_abs()) * u64::from(y.mantissa.unsigned_abs());
         let exponent = x.exponent + y.exponent + z.exponent;

@@ -204,8 +204,8 @@ impl Exact {
         if both.exact {
             watch.exact();
         }
-        [0, 1].map(|root| {
-            let (t, t_error) = (both.t[root], both.t_error[root]);
+        let ([near, far], [near_error, far_error]) = (both.t, both.t_error);
+        [(0, near, near_error), (1, far, far_error)].map(|(root, t, t_error)| {
             let met = ExactMet {
                 t,
                 t_error,

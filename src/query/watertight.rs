@@ -71,8 +71,8 @@ impl Decide for Watertight {
         _: &mut impl Watch,
     ) -> [Option<WatertightMet>; 2] {
         let nearest = usize::from(lane.detail.far_is_nearest);
-        [0, 1].map(|root| {
-            let (t, slack) = (lane.detail.t[root], lane.detail.t_error);
+        let ([near, far], slack) = (lane.detail.t, lane.detail.t_error);
+        [(0, near), (1, far)].map(|(root, t)| {
             // Written so that a NaN stays.
             if t + slack < ray.t_min || t - slack > ray.t_max {
                 return None;
