@@ -10,7 +10,7 @@ use crate::caller::{Caller, Threads};
 use crate::choice::suits_grid;
 use crate::error::BuildError;
 use crate::grid::{self, GridKind, GridOptions};
-use crate::instance::{Placed, fixed_size, write};
+use crate::instance::{Counted, Placed, fixed_size, write};
 use crate::kinds::{GRID, INSTANCES, REFIT, SPHERES, WIDE};
 use crate::list;
 use crate::math::Aabb;
@@ -288,7 +288,11 @@ impl<'s> LevelPlan<'s> {
         let placed = Placed::new(scene, bounds)?;
         let asked = if asked == Structure::Automatic { options.bvh() } else { asked };
         let handful = if options.plain_list == PlainList::Always { u32::MAX } else { 0 };
-        let index = Plan::new(&Scene::of_boxes(&placed), options, asked, handful)?;
+        // The size of a tree does not depend on where its boxes are.
+        let index = match asked {
+            Structure::Grid(_) => Plan::new(&Scene::of_boxes(&placed), options, asked, handful)?,
+            _ => Plan::new(&Scene::of_boxes(&Counted(&placed)), options, asked, handful)?,
+        };
         let fixed = fixed_size(scene.instance_count()).ok_or(BuildError::TooLarge)?;
         Ok(LevelPlan { placed, index, fixed })
     }
@@ -376,7 +380,10 @@ impl LevelPlan<'_> {
         write(placed, own, bytes, |boxes, rest| {
             let room = rest.len().min(index.size);
             let caller = Caller::new(options.threads, None);
-            index.run(&Scene::of_boxes(boxes), options, &caller, rest.get_mut(..room)?).ok()
+            let scene = Scene::of_boxes(boxes);
+            let census = Census::take(&scene, &index.survey, &caller).ok()?;
+            let index = Plan { census, ..*index };
+            index.run(&scene, options, &caller, rest.get_mut(..room)?).ok()
         })
     }
 }

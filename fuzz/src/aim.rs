@@ -43,7 +43,7 @@ impl Aim {
         Some(match self.part % 6 {
             1 => self.within(level, LINE),
             // Which child an instance shows, and its mask.
-            2 => records + self.word % instances * RECORD + 144 + self.word / instances % 2 * 4,
+            2 => records + self.word % instances * RECORD + 80 + self.word / instances % 2 * 4,
             3 => self.within(records, instances * RECORD),
             4 => self.within(table, children * 8),
             _ => self.within(index, HEADER),

@@ -9,6 +9,10 @@ use crate::{bvh, grid};
 /// Whether what is not in instances can be traversed.
 #[inline]
 pub(super) fn block_is_sound(block: &Block) -> bool {
+    is_sound(block, false)
+}
+
+fn is_sound(block: &Block, of_index: bool) -> bool {
     let Block { header, geometries, grids, nodes, bundles, words, runs, .. } = *block;
     let leaves = Leaves::of(block);
     let no_grid = grids.is_empty() && words.is_empty() && runs.is_empty();
@@ -21,13 +25,13 @@ pub(super) fn block_is_sound(block: &Block) -> bool {
         }
         (KIND_BVH, Bundles::None) => no_grid && bvh::tree_is_sound(nodes, &leaves),
         (KIND_BVH, Bundles::Four(bundles)) if WIDE => {
-            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
+            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves, of_index)
         }
         (KIND_BVH, Bundles::Eight(bundles)) if WIDE => {
-            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
+            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves, of_index)
         }
         (KIND_BVH, Bundles::Sixteen(bundles)) if WIDE => {
-            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves)
+            no_grid && no_nodes && bvh::bundles_are_sound(bundles, &leaves, of_index)
         }
         _ => false,
     };
@@ -45,7 +49,8 @@ pub(super) fn level_is_sound(level: &Level) -> bool {
     let index = level.index.parts();
     let count = level.instances.len() as u32;
     let children = level.head.child_count;
-    block_is_sound(&index)
+    is_sound(&index, true)
+        && index.prim_ids.iter().all(|instance| *instance < count)
         && index.header.triangle_limit == 0
         && index.header.prim_limit == count
         && level.instances.iter().all(|instance| instance.child < children)

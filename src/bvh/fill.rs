@@ -51,6 +51,11 @@ pub(super) fn pack(
     runs.iter().flatten().try_for_each(|run| run.packed)
 }
 
+/// Takes the marks off the ids of leaves that have no blocks.
+pub(super) fn take_marks_off(ids: &mut [u32]) {
+    ids.iter_mut().for_each(|id| *id &= !BEGINS);
+}
+
 impl Run<'_> {
     fn pack(&mut self, source: Source, first_sphere: usize) -> Option<()> {
         let (first, first_sphere) = (self.first as u32, self.first.max(first_sphere) as u32);

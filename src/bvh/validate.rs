@@ -45,12 +45,16 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
 }
 
 /// Whether the bundles form one tree, no deeper than a traversal's stack, over just the leaf blocks
-/// that there are.
+/// that there are, or in an index without any over just the ids.
 ///
 /// A depth-first walk that takes lanes in order meets a bundle: its inner children have the next
 /// numbers of bundles, its leaves the next numbers of blocks of their kind. So the walk is repeated
 /// with a counter for each, as in [`tree_is_sound`].
-pub(crate) fn bundles_are_sound<const W: usize>(bundles: &[Bundle<W>], leaves: &Leaves) -> bool {
+pub(crate) fn bundles_are_sound<const W: usize>(
+    bundles: &[Bundle<W>],
+    leaves: &Leaves,
+    of_index: bool,
+) -> bool {
     // For each level the next bundle to meet, and the end of its siblings.
     let mut stack = [(0, 0); MAX_DEPTH];
     stack[0] = (0, 1);
@@ -79,7 +83,10 @@ pub(crate) fn bundles_are_sound<const W: usize>(bundles: &[Bundle<W>], leaves: &
     }
     next.bundle == bundles.len()
         && next.triangle_block == leaves.triangle_blocks.len()
-        && next.sphere_block == leaves.sphere_blocks.len()
+        && match of_index {
+            true => leaves.sphere_blocks.is_empty() && next.sphere_block == leaves.prim_ids.len(),
+            false => next.sphere_block == leaves.sphere_blocks.len(),
+        }
 }
 
 /// The numbers that the walk expects next.
@@ -187,7 +194,7 @@ mod tests {
         let triangle_blocks = std::vec![TriangleBlock::EMPTY; triangle_blocks];
         let sphere_blocks = std::vec![SphereBlock::EMPTY; sphere_blocks];
         let (triangle_blocks, sphere_blocks) = (&triangle_blocks[..], &sphere_blocks[..]);
-        bundles_are_sound(bundles, &Leaves { triangle_blocks, sphere_blocks, prim_ids: &[] })
+        bundles_are_sound(bundles, &Leaves { triangle_blocks, sphere_blocks, prim_ids: &[] }, false)
     }
 
     #[test]

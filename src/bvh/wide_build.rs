@@ -7,7 +7,7 @@ use super::choose::choose;
 use super::collapse::Grounds;
 use super::compact;
 use super::emit::{Chosen, Sizes};
-use super::fill::pack;
+use super::fill::{pack, take_marks_off};
 use super::refs::{PrimRef, gather, refs_per_prim};
 use super::reinsert::mend;
 use super::split::Areas;
@@ -91,6 +91,9 @@ impl Places {
 /// What the nodes of one more leaf take.
 const PAIR: usize = 2 * size_of::<BvhNode>();
 
+/// What nodes, choice and id of a leaf of one primitive take.
+const SCRATCH: u64 = (PAIR + size_of::<u64>() + size_of::<u32>()) as u64;
+
 /// The end of header and geometries.
 fn front(survey: &Survey) -> Option<usize> {
     let counts = Counts { geometries: survey.geometry_count, ..Counts::default() };
@@ -100,7 +103,8 @@ fn front(survey: &Survey) -> Option<usize> {
 /// The bytes for a good tree of bundles, and the bytes below which there is no tree at all.
 ///
 /// The first is the larger of two: what growing takes, which is all that a scan or a terrain needs,
-/// and the finished block of a soup, in which leaf blocks hold 3.55 triangles.
+/// and the finished block of a soup, in which leaf blocks hold 3.55 triangles. In an index no leaf blocks take the place of
+/// what bundles are made from, so it takes both.
 pub(crate) fn needs_wide(
     survey: &Survey,
     census: &Census,
@@ -108,24 +112,30 @@ pub(crate) fn needs_wide(
 ) -> Result<(usize, usize), BuildError> {
     let (compact, minimum) = compact::needs(survey, census)?;
     let triangle_blocks = (u64::from(census.triangle_count) * 20).div_ceil(71) as u32;
-    let sphere_blocks = census.sphere_count.div_ceil(if census.is_index { 1 } else { 4 });
+    let leaves = census.sphere_count.div_ceil(if census.is_index { 1 } else { 4 });
     // Three lanes for two leaf blocks.
-    let lanes = 3 * u64::from(triangle_blocks + sphere_blocks) / 2;
+    let lanes = 3 * u64::from(triangle_blocks + leaves) / 2;
     let bundles = 2 + lanes / u64::from(width);
-    let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks };
+    let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks: leaves };
     let finished = counts(survey, census, census.hittable(), &sizes, width)
         .offsets()
         .ok_or(BuildError::TooLarge)?;
-    Ok((compact.max(finished.end), minimum))
+    let prims = u64::from(if census.is_index { census.hittable() } else { 0 });
+    // And what is lost between them.
+    let beside = prims * SCRATCH + 4 * ALIGNMENT as u64;
+    let beside = usize::try_from(beside).map_err(|_| BuildError::TooLarge)?;
+    let size = finished.end.checked_add(beside).ok_or(BuildError::TooLarge)?;
+    Ok((compact.max(size), minimum))
 }
 
-/// The parts of the finished block.
+/// The parts of the finished block. In an index every leaf is one instance, so its number among the ids says all, and it has no
+/// block.
 fn counts(survey: &Survey, census: &Census, prim_ids: u32, sizes: &Sizes, width: u32) -> Counts {
     Counts {
         geometries: survey.geometry_count,
         prim_ids,
         bundle_lanes: sizes.bundles.saturating_mul(width),
-        sphere_blocks: sizes.sphere_blocks,
+        sphere_blocks: if census.is_index { 0 } else { sizes.sphere_blocks },
         triangle_blocks: sizes.triangle_blocks,
         motions: census.refit.into(),
         ..Counts::default()
@@ -187,7 +197,11 @@ where
         if at.words <= scratch.choices && at.end <= bytes.len() {
             how.caller.done(0.85)?;
             scratch.emit::<W>(first_sphere, &counts, bytes)?;
-            pack((scene, census.refit), first_sphere, counts.parts_mut(bytes)?, how.caller)?;
+            let parts = counts.parts_mut(bytes)?;
+            match census.is_index {
+                true => take_marks_off(parts.prim_ids),
+                false => pack((scene, census.refit), first_sphere, parts, how.caller)?,
+            }
             return counts.seal(KIND_BVH, W as u32, census, bytes);
         }
     }

@@ -29,16 +29,26 @@ impl Map {
     ///
     /// The determinant is exact in sign, and within `1.001 UNIT`; the minors are differences of exact products.
     pub fn new(object_to_world: [f32; 12]) -> Option<Map> {
-        if !object_to_world.iter().all(|x| x.is_finite()) {
+        let rows = rows(&object_to_world);
+        Self::with(object_to_world, rows, exact_determinant(rows))
+    }
+
+    /// The same with an inverse that may be off by `2^-30` of itself: for those who look at many maps before they use any.
+    pub fn roughly(object_to_world: [f32; 12]) -> Option<Map> {
+        let rows = rows(&object_to_world);
+        let [a, b, c] = rows.map(wide);
+        let minors = minors(b, c);
+        let (sum, size) = (a.dot(minors), a.abs().dot(minors.abs()));
+        // Of six roundings, each within `UNIT` of the size.
+        let is_clear = sum.abs() > size / (1u64 << 20) as f64 && size < f64::INFINITY;
+        Self::with(object_to_world, rows, if is_clear { sum } else { exact_determinant(rows) })
+    }
+
+    fn with(object_to_world: [f32; 12], rows: [[f32; 3]; 3], determinant: f64) -> Option<Map> {
+        if determinant == 0.0 || !object_to_world.iter().all(|x| x.is_finite()) {
             return None;
         }
-        let [a, b, c] = rows(&object_to_world);
-        // The volume of the second pair: `a . (b x c)`.
-        let [_, determinant, _] = volumes(&Line { origin: [0.0; 3], direction: a }, &[b, c, b]);
-        if determinant == 0.0 {
-            return None;
-        }
-        let [a, b, c] = [wide(a), wide(b), wide(c)];
+        let [a, b, c] = rows.map(wide);
         let columns = [minors(b, c), minors(c, a), minors(a, b)];
         let world_to_object =
             [0, 1, 2].map(|i| [0, 1, 2].map(|j: usize| columns[j][i] / determinant));
@@ -59,6 +69,12 @@ impl Map {
         // Three products, and three sums that are rounded.
         let rounding = size / (1u64 << 50) as f64;
         [least - rounding, most + rounding]
+    }
+
+    /// What three sums of three products and the shift may be off, for points of `aabb`.
+    pub fn rounding(&self, aabb: &Aabb) -> DVec3 {
+        let contents = clamped(aabb.lower).abs().max(clamped(aabb.upper).abs());
+        (self.widest(contents) + self.shift().abs()) / (1u64 << 50) as f64
     }
 
     /// How far a point of a ray may be, along each axis, from where the instance of what its rounded ray meets is, when the ray
@@ -142,6 +158,17 @@ fn rows(m: &[f32; 12]) -> [[f32; 3]; 3] {
     [0, 4, 8].map(|i| [m[i], m[i + 1], m[i + 2]])
 }
 
+/// `a . (b x c)`; zero if that is not finite.
+fn exact_determinant(rows: [[f32; 3]; 3]) -> f64 {
+    if !rows.as_flattened().iter().all(|x| x.is_finite()) {
+        return 0.0;
+    }
+    let [a, b, c] = rows;
+    // The volume of the second pair.
+    let [_, determinant, _] = volumes(&Line { origin: [0.0; 3], direction: a }, &[b, c, b]);
+    determinant
+}
+
 /// `p x q` of floats: each product is exact, so each component is rounded once.
 fn minors(p: DVec3, q: DVec3) -> DVec3 {
     p.cross(q)
@@ -220,6 +247,7 @@ impl InstanceRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::{self, Kernel, Scalar};
 
     #[test]
     fn only_maps_without_volume_are_singular() {
@@ -233,6 +261,73 @@ mod tests {
         assert!(with([f32::NAN, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).is_none());
         assert!(with([1e-44, 0.0, 0.0, 0.0, 1e-44, 0.0, 0.0, 0.0, 1e-44]).is_some());
         assert!(with([3e38, 0.0, 0.0, 0.0, 3e38, 0.0, 0.0, 0.0, 3e38]).is_some());
+    }
+
+    #[test]
+    fn vectors_map_rays_as_numbers_do() {
+        struct Compare<'a>(&'a InstanceRecord, &'a Ray);
+        impl Kernel for Compare<'_> {
+            type Output = ();
+
+            fn run<S: Simd>(self, s: S) {
+                let Compare(record, ray) = self;
+                let limited = Ray { t_max: 7.0, ..*ray };
+                let (expected, mut room) = (record.object_ray(&limited), [0.0; 8]);
+                let mapped = record.object_ray_by(s, ray, 7.0, &mut room);
+                let bits = |ray: &Ray| ray.row().map(f32::to_bits);
+                match expected {
+                    Some(expected) => assert_eq!(mapped.map(bits), Some(bits(&expected))),
+                    // Whoever is asked about it finds out.
+                    None => assert!(mapped.is_none_or(|ray| ray.prepare(1.0).is_none())),
+                }
+            }
+        }
+        let mut state = 1u32;
+        let mut next = || {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            (state >> 8) as f32 / (1 << 22) as f32 - 2.0
+        };
+        for i in 0..500 {
+            let size = [1.0, 1e-30, 1e20, 3e37][i % 4];
+            let Some(map) = Map::new([0; 12].map(|_| next() * size)) else { continue };
+            let record = InstanceRecord {
+                world_to_object: map.columns(),
+                child: 0,
+                mask: 0,
+                object_to_world: map.object_to_world,
+                bounds: Aabb::EMPTY,
+            };
+            let inverse = record.map().world_to_object;
+            assert_eq!(inverse, map.world_to_object);
+            let direction = if i % 9 == 0 { [0.0, -0.0, next()] } else { [0; 3].map(|_| next()) };
+            let ray = Ray::new([0; 3].map(|_| next() * size), direction);
+            let compare = || Compare(&record, &ray);
+            simd::dispatch(compare());
+            Scalar.run(compare());
+        }
+    }
+
+    #[test]
+    fn rough_maps_are_nearly_right() {
+        let mut state = 1u32;
+        let mut next = || {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            (state >> 8) as f32 / (1 << 23) as f32 - 1.0
+        };
+        for i in 0..1000 {
+            let mut m = [0; 12].map(|_| next());
+            // Half of them nearly flat: their determinants are exact.
+            for k in (0..3).filter(|_| i % 2 == 0) {
+                m[8 + k] = m[k] + m[4 + k];
+            }
+            let maps = Map::new(m).zip(Map::roughly(m));
+            assert_eq!(maps.is_some(), Map::roughly(m).is_some());
+            let Some((map, rough)) = maps else { continue };
+            let pairs = map.world_to_object.into_iter().zip(rough.world_to_object);
+            for (x, y) in pairs.flat_map(|(x, y)| x.into_iter().zip(y)) {
+                assert!((x - y).abs() <= x.abs() / (1u64 << 30) as f64, "{m:?}");
+            }
+        }
     }
 
     #[test]

@@ -5,8 +5,9 @@
 
 mod boxes;
 mod map;
+mod parts;
 mod write;
 
-pub(crate) use boxes::Placed;
+pub(crate) use boxes::{Counted, Placed};
 pub(crate) use map::Map;
 pub(crate) use write::{fixed_size, write};

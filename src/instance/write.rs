@@ -85,7 +85,7 @@ fn list_children(placed: &Placed, children: &mut [u64]) -> usize {
 }
 
 fn address(placing: &Placing) -> u64 {
-    placing.child.expose_provenance() as u64
+    placing.bytes().expose_provenance() as u64
 }
 
 /// The bytes between the parts are zero in every block.

@@ -53,8 +53,7 @@ fn widening(level: &Level, ray: &Ray) -> f64 {
     f64::from(level.head.spread) * beyond.max(0.0)
 }
 
-/// The instance that is a leaf of an index in bundles, where each has a leaf block of its own: so the blocks are as many as the
-/// ids, in the same order, and need not be looked at.
+/// The instance that is a leaf of an index in bundles, where each is one.
 #[inline(always)]
 pub(super) fn instance_of(index: &Block, leaf: ChildRef) -> Option<u32> {
     let (_, number) = leaf.leaf_block();

@@ -25,8 +25,8 @@ pub(super) struct Stops {
     /// The ray enters their boxes at no smaller `t`.
     near: [f32; ROOM],
     instances: [u32; ROOM],
-    count: usize,
-    next: usize,
+    count: u8,
+    next: u8,
     /// Those for which there was no room it enters at no smaller `t` than this.
     beyond: f32,
 }
@@ -42,14 +42,15 @@ impl Stops {
 
     /// The next one that the ray enters before `limit`.
     pub fn next(&mut self, limit: f32) -> Option<u32> {
-        let near = *self.near.get(self.next).filter(|_| self.next < self.count)?;
+        let next = usize::from(self.next);
+        let near = *self.near.get(next).filter(|_| self.next < self.count)?;
         // What follows is no nearer.
         if !(near <= limit) {
             self.count = 0;
             return None;
         }
         self.next += 1;
-        self.instances.get(self.next - 1).copied()
+        self.instances.get(next).copied()
     }
 
     /// Whether there is none before `limit` for which there was no room.
@@ -58,13 +59,13 @@ impl Stops {
     }
 
     fn add(&mut self, instance: u32, near: f32) {
-        let mut last = (near, instance);
-        for (near, instance) in self.near.iter_mut().zip(&mut self.instances).take(self.count) {
+        let (mut last, count) = ((near, instance), usize::from(self.count));
+        for (near, instance) in self.near.iter_mut().zip(&mut self.instances).take(count) {
             if last.0 < *near {
                 last = (mem::replace(near, last.0), mem::replace(instance, last.1));
             }
         }
-        let places = (self.near.get_mut(self.count), self.instances.get_mut(self.count));
+        let places = (self.near.get_mut(count), self.instances.get_mut(count));
         if let (Some(near), Some(instance)) = places {
             (*near, *instance) = last;
             self.count += 1;

@@ -95,6 +95,11 @@ impl Seek for NearInstances<'_, '_, '_> {
 
     fn block(&mut self, (kind, number): (u32, usize), lanes: u32) {
         let Leaves { sphere_blocks, prim_ids, .. } = self.leaves;
+        // In bundles each is a leaf.
+        if sphere_blocks.is_empty() {
+            prim_ids.get(number).into_iter().for_each(|id| self.consider(*id));
+            return;
+        }
         let Some(block) = sphere_blocks.get(number).filter(|_| kind == KIND_SPHERES) else {
             return;
         };

@@ -93,7 +93,7 @@ impl Leaves<'_> {
         false
     }
 
-    /// Offers `query` what the ray meets in a block of a wide BVH, all of which is one leaf.
+    /// Offers `query` what the ray meets in a block of a wide BVH, all of which is one leaf, or the instance that is one.
     #[inline(always)]
     pub fn intersect_whole<S: Simd, Q: Query>(
         &self,
@@ -102,6 +102,9 @@ impl Leaves<'_> {
         ray: &PreparedRay,
         query: &mut Q,
     ) -> bool {
+        if Q::OF_INDEX {
+            return self.prim_ids.get(number).is_some_and(|id| query.instance(*id));
+        }
         self.intersect_block(s, kind, number, u32::MAX, ray, query)
     }
 
