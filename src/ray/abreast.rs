@@ -2,7 +2,8 @@
 
 use super::Ray;
 use super::alike::Alike;
-use super::frame::{BLUR, DEPTH_SLACK, ORDINARY, SLOWEST, TINY};
+use super::exponents::ORDINARY;
+use super::frame::{BLUR, DEPTH_SLACK, SLOWEST, TINY};
 use super::slab::{CONSTANT_PAD, NEGLIGIBLE, RELATIVE_PAD};
 use crate::simd::{Lanes, Width};
 

@@ -1,7 +1,7 @@
 //! What rays have in common that are traced together.
 
 use super::Ray;
-use super::frame::{is_ordinary, scale_below};
+use super::exponents::{is_ordinary, scale_below};
 use super::packet::GROUPS;
 use crate::simd::{Lanes, Width};
 

@@ -5,15 +5,18 @@ mod alike;
 mod axis;
 #[cfg(test)]
 mod bounds;
+mod exponents;
 mod frame;
 mod packet;
+mod prepare;
 mod slab;
 
 pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
-pub(crate) use frame::{Early, Late, Passing, PreparedRay, TINY};
+pub(crate) use frame::{PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, RayPacket, Spread};
+pub(crate) use prepare::{Early, Late, Passing};
 pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".

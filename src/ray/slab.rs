@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use super::frame::{SLOWEST, is_ordinary, largest_bits};
+use super::exponents::{is_ordinary, largest_bits};
+use super::frame::SLOWEST;
 use super::{Interval, PreparedRay};
 use crate::math::float::less;
 use crate::math::rounding::{UNIT32, f32_above, f32_below, gamma};

@@ -1,0 +1,85 @@
+//! Powers of two that bring rays into their frames, and limits that are rounded on the way.
+
+use crate::math::float::narrow_power_of_two;
+use crate::math::rounding::{Round, f32_above, f32_below, scaled_by};
+use crate::simd::SMALL;
+
+/// Ordinary scenes, origins and directions are smaller than this, and not all smaller than its reciprocal.
+pub(super) const ORDINARY: f32 = (1u64 << 60) as f32;
+
+#[inline(always)]
+pub(super) fn is_ordinary(x: f32) -> bool {
+    (1.0 / ORDINARY..ORDINARY).contains(&x)
+}
+
+/// That of infinity, and of NaN.
+pub(super) const EXPONENT: u32 = f32::INFINITY.to_bits();
+
+/// `2^n` by the bits of a float: its exponent.
+#[inline(always)]
+pub(super) fn exponent_bits(x: f32) -> u32 {
+    x.to_bits() & EXPONENT
+}
+
+/// The power of two that brings an ordinary number, and all that are not larger, below 1.
+#[inline(always)]
+pub(super) fn scale_below(x: f32) -> f32 {
+    f32::from_bits((253 << 23) - exponent_bits(x))
+}
+
+/// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
+/// infinities and NaN above the others.
+#[cfg_attr(target_os = "none", inline(never))]
+pub(super) fn largest_bits(v: &[f32; 3]) -> u32 {
+    v.iter().fold(0, |most, x| most.max(x.abs().to_bits()))
+}
+
+/// The exponent `e` with `|x| < 2^e` by the bits of `|x|`, at least -126; 129 for infinity.
+pub(super) fn exponent_above(bits: u32) -> i32 {
+    (bits >> 23) as i32 - 126
+}
+
+/// `t * scale`, the scale a power of two, unless it is neither zero nor a normal float, but also when it is infinite.
+#[inline(always)]
+fn scaled(t: f32, scale: f32) -> Option<f32> {
+    let product = t * scale;
+    (product.abs() >= f32::MIN_POSITIVE || t == 0.0).then_some(product)
+}
+
+/// The largest float that is not above `t * scale`.
+#[inline(always)]
+pub(super) fn below(t: f32, scale: f32) -> f32 {
+    match scaled(t, scale) {
+        Some(product) if product > f32::MAX => f32::MAX,
+        Some(product) => product,
+        None => rarely(f32_below, t, scale),
+    }
+}
+
+/// The smallest float that is not below `t * scale`.
+#[inline(always)]
+pub(super) fn above(t: f32, scale: f32) -> f32 {
+    match scaled(t, scale) {
+        Some(product) if product < -f32::MAX => -f32::MAX,
+        Some(product) => product,
+        None => rarely(f32_above, t, scale),
+    }
+}
+
+/// `t * 2^n` of a finite `t`, which is a float unless it is not a normal one. Out of line, and without `f64`.
+#[cfg_attr(target_os = "none", inline(always))]
+#[cfg_attr(not(target_os = "none"), inline(never))]
+pub(super) fn rounded(t: f32, n: i32, round: Round) -> f32 {
+    let in_floats = !SMALL && (-126..=127).contains(&n);
+    let exact = if in_floats { scaled(t, narrow_power_of_two(n)) } else { None };
+    match exact {
+        Some(product) if product.abs() <= f32::MAX => product,
+        _ => scaled_by(t, n, round),
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn rarely(round: fn(f64) -> f32, t: f32, scale: f32) -> f32 {
+    round(f64::from(t) * f64::from(scale))
+}
