@@ -122,7 +122,7 @@ pub(crate) fn needs_wide(
         .ok_or(BuildError::TooLarge)?;
     let prims = u64::from(if census.is_index { census.hittable() } else { 0 });
     // And what is lost between them.
-    let beside = prims * SCRATCH + 4 * ALIGNMENT as u64;
+    let beside = (prims * SCRATCH).next_multiple_of(ALIGNMENT as u64) + 4 * ALIGNMENT as u64;
     let beside = usize::try_from(beside).map_err(|_| BuildError::TooLarge)?;
     let size = finished.end.checked_add(beside).ok_or(BuildError::TooLarge)?;
     Ok((compact.max(size), minimum))
