@@ -15,6 +15,8 @@ const FEW_IN_ORDER: f32 = 0.12;
 
 /// Lists are short if so many primitives at most are in the longest, times the rays for each primitive: for what a ray may have to test.
 const SHORT: f32 = 285.0;
+/// And if so many at most are in the cells along an axis where lists are as long as where the primitives are, times the same.
+const FEW_ALONG: f32 = 1400.0;
 
 /// Primitives are compact if the box of one lies in up to this many cells on average.
 const COMPACT: f64 = 4.0;
@@ -28,15 +30,20 @@ pub(crate) fn suits_grid(scene: &Scene, census: &Census, rays_per_prim: f32) -> 
     if !(0.0 < rays_per_prim && rays_per_prim < FEW_RAYS) {
         return false;
     }
-    let Spread { longest, cells, in_order } = Spread::of(scene, census);
+    let Spread { longest, mean, cells, in_order } = Spread::of(scene, census);
     let order_allows = rays_per_prim < FEW_IN_ORDER || in_order < IN_ORDER;
-    longest as f32 * rays_per_prim <= SHORT && cells <= COMPACT && order_allows
+    let along = mean * cube_root(f64::from(census.hittable())) as f32;
+    let lists_are_short =
+        longest as f32 * rays_per_prim <= SHORT && along * rays_per_prim <= FEW_ALONG;
+    lists_are_short && cells <= COMPACT && order_allows
 }
 
 /// How primitives lie in the box around them, in a grid with as many cells along each axis as the cube root of their number.
 struct Spread {
     /// How many centres are in the fullest cell in which one of a sample is.
     longest: u32,
+    /// How many are in the cell in which one of them is, on average.
+    mean: f32,
     /// The cells in which the box of one lies on average.
     cells: f64,
     /// The share of them that is near the one before.
@@ -67,7 +74,8 @@ impl Spread {
             before = from;
         });
         let all = f64::from(census.hittable());
-        Spread { longest: lists.longest(), cells: cells / all, in_order: f64::from(near) / all }
+        let (longest, mean) = (lists.longest(), lists.mean());
+        Spread { longest, mean, cells: cells / all, in_order: f64::from(near) / all }
     }
 }
 
@@ -109,10 +117,12 @@ const NOWHERE: u32 = u32::MAX;
 struct Lists {
     cells: [u32; SLOTS],
     counts: [u32; SLOTS],
+    /// How many of the sample are in each.
+    samples: [u32; SLOTS],
 }
 
 impl Lists {
-    const NONE: Self = Lists { cells: [NOWHERE; SLOTS], counts: [0; SLOTS] };
+    const NONE: Self = Lists { cells: [NOWHERE; SLOTS], counts: [0; SLOTS], samples: [0; SLOTS] };
 
     /// The slot of a cell, or where it would be.
     fn slot(&self, cell: u32) -> usize {
@@ -124,14 +134,23 @@ impl Lists {
         slot % SLOTS
     }
 
-    /// Counts what is in this cell from now on.
+    /// Counts what is in this cell, in which one of the sample is, from now on.
     fn begin(&mut self, cell: u32) {
-        self.cells[self.slot(cell)] = cell;
+        let slot = self.slot(cell);
+        self.cells[slot] = cell;
+        self.samples[slot] += 1;
     }
 
     fn count(&mut self, cell: u32) {
         let slot = self.slot(cell);
         self.counts[slot] += u32::from(self.cells[slot] == cell);
+    }
+
+    /// Of the counts, each as often as the sample is in it.
+    fn mean(&self) -> f32 {
+        let counts = self.counts.iter().zip(&self.samples);
+        let sum: f32 = counts.map(|(count, samples)| *count as f32 * *samples as f32).sum();
+        sum / self.samples.iter().sum::<u32>().max(1) as f32
     }
 
     fn longest(&self) -> u32 {

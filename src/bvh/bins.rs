@@ -59,6 +59,13 @@ impl Effort {
         (!self.is_even(unevenness)).then_some(uneven)
     }
 
+    /// The effort for parts of an uneven scene that are even. At least that of balanced builds: parting such scenes takes
+    /// longer anyway, and hasty planes below good ones cost rays more than they save.
+    pub fn for_even_parts(self) -> Effort {
+        let samples = self.samples.max(Effort::BALANCED.samples);
+        Effort { samples, one_axis: false, ..self }
+    }
+
     /// Whether so uneven refs need no more than others.
     pub fn is_even(&self, unevenness: f64) -> bool {
         // Refs without any area are.

@@ -328,11 +328,13 @@ mod tests {
             .collect();
         let count = refs.len();
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); count];
-        // Both choose planes of large nodes by samples.
-        for effort in [Effort::FAST, Effort::BALANCED] {
+        let (fast, balanced) = (Effort::FAST, Effort::BALANCED);
+        let careful = balanced.for_uneven(f64::INFINITY).expect("more effort");
+        // All choose planes of large nodes by samples, the last one of those that turn out to be even.
+        for (effort, even) in [(fast, None), (balanced, None), (careful, Some(balanced))] {
             let (leaves, leaf_max, depth) = (count / 2, 4, Depth::Whole);
             let limits =
-                Limits { leaves, source: None, leaf_max, mixed: false, depth, effort, even: None };
+                Limits { leaves, source: None, leaf_max, mixed: false, depth, effort, even };
             let size = grow(&mut nodes, &mut refs, count, &limits, &Caller::new(None, None));
             assert_eq!(size.map(|size| size.refs), Some(count));
             let (mut pending, mut first) = (std::vec![0], 0);

@@ -59,8 +59,8 @@ impl Places {
     fn new(survey: &Survey, census: &Census, size: usize) -> Option<Places> {
         let mixed = census.is_mixed();
         let room = census.hittable() as usize;
-        // More leaves, a half of the primitives or all, made no ray faster: the collapse puts them
-        // together again.
+        // More leaves, a half of the primitives or all, made no ray through an even scene faster: the collapse puts
+        // them together again.
         let leaves = leaf_budget(room, mixed, leaf_max(census, 1), false);
         let places = Places { refs: front(survey)?, nodes: 0, room, leaves };
         places.fitting(room, leaves, size)
@@ -247,7 +247,7 @@ fn grow_tree(
             None => Depth::Deep,
         },
         effort,
-        even: uneven.map(|_| how.effort),
+        even: uneven.map(|_| how.effort.for_even_parts()),
     };
     let size = grow(nodes, slots, count, &limits, how.caller)?;
     let (free, ids) = ids_to_end(refs, &size)?;
