@@ -16,7 +16,7 @@ const FEW_IN_ORDER: f32 = 0.12;
 /// Lists are short if so many primitives at most are in the longest, times the rays for each primitive: for what a ray may have to test.
 const SHORT: f32 = 285.0;
 /// And if so many at most are in the cells along an axis where lists are as long as where the primitives are, times the same.
-const FEW_ALONG: f32 = 1400.0;
+const FEW_ALONG: f32 = 2900.0;
 
 /// Primitives are compact if the box of one lies in up to this many cells on average.
 const COMPACT: f64 = 4.0;
