@@ -240,21 +240,24 @@ impl<'m> Accel<'m> {
         watch: impl Watch,
         any: bool,
     ) -> Option<Hit> {
-        let block = self.0;
         match options.precision {
-            Precision::Exact if block.has_level() => {
-                in_levels::<Exact>(block, ray, options, watch, any)
-            }
-            Precision::Watertight if block.has_level() => {
-                in_levels::<Watertight>(block, ray, options, watch, any)
-            }
-            Precision::Exact => {
-                trace::either_hit::<Exact, _>(block, ray, self.choice(options), watch, any)
-            }
-            Precision::Watertight => {
-                trace::either_hit::<Watertight, _>(block, ray, self.choice(options), watch, any)
-            }
+            Precision::Exact => self.either_by::<Exact>(ray, options, watch, any),
+            Precision::Watertight => self.either_by::<Watertight>(ray, options, watch, any),
         }
+    }
+
+    #[inline(always)]
+    fn either_by<D: Across>(
+        &self,
+        ray: &Ray,
+        options: &QueryOptions,
+        watch: impl Watch,
+        any: bool,
+    ) -> Option<Hit> {
+        if self.0.has_level() {
+            return in_levels::<D>(self.0, ray, options, watch, any);
+        }
+        trace::either_hit::<D, _>(self.0, ray, self.choice(options), watch, any)
     }
 
     /// All hits that `options` leaves, in the order of their real `t`; at equal `t` by instance, geometry and

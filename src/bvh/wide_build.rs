@@ -79,8 +79,8 @@ impl Places {
     /// These places have room for so many refs and for `least` leaves.
     fn for_uneven(self, count: usize, least: usize, cut: bool, size: usize) -> Places {
         const REF: usize = size_of::<PrimRef>();
-        let free = (self.nodes + self.leaves * PAIR - self.refs)
-            .saturating_sub(count * REF + least * PAIR);
+        let end = self.nodes + self.leaves * PAIR;
+        let free = (end - self.refs).saturating_sub(count * REF + least * PAIR);
         let more = if cut { (count / 4).min(free / (2 * REF)) } else { 0 };
         let room = count + more;
         let leaves = room.min(least + (free - more * REF) / PAIR).max(least);
