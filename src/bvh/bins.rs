@@ -14,12 +14,12 @@ pub(crate) struct Effort {
     bins: usize,
     /// Of more refs than twice this, some are enough to choose a plane by.
     samples: usize,
-    /// Whether only the axis is looked at along which the centres are furthest apart.
-    one_axis: bool,
     /// Whether refs that may be one leaf stay together, as long as they are even: the collapse would seldom part them.
     pub whole: bool,
     /// Triangles at most that go as one, each with an edge of the one before.
     pub strip: usize,
+    /// Whether leaves of even scenes are runs of refs along a curve.
+    pub runs: bool,
     /// Above this unevenness of the refs more is done.
     even: f64,
     /// Whether refs may then be cut in two.
@@ -27,22 +27,22 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    pub const FAST: Effort = Effort {
+    pub const FAST: Effort = Effort { strip: 4, runs: true, ..Effort::BALANCED };
+    pub const BALANCED: Effort = Effort {
         bins: 16,
-        samples: 64,
-        one_axis: true,
+        samples: 512,
         whole: true,
-        strip: 4,
+        strip: 2,
+        runs: false,
         even: 64.0,
         cuts: false,
     };
-    pub const BALANCED: Effort = Effort { samples: 512, one_axis: false, strip: 2, ..Effort::FAST };
     pub const BEST: Effort = Effort {
         bins: BINS,
         samples: ALL,
-        one_axis: false,
         whole: false,
         strip: 1,
+        runs: false,
         even: 4.0,
         cuts: true,
     };
@@ -55,15 +55,8 @@ impl Effort {
     /// The effort where few refs are much larger than the others, such as the walls of a building: a sample says nothing
     /// of them, and where they are parted matters. `None` for scenes that are even enough.
     pub fn for_uneven(self, unevenness: f64) -> Option<Effort> {
-        let uneven = Effort { bins: BINS, samples: ALL, one_axis: false, whole: false, ..self };
+        let uneven = Effort { bins: BINS, samples: ALL, whole: false, ..self };
         (!self.is_even(unevenness)).then_some(uneven)
-    }
-
-    /// The effort for parts of an uneven scene that are even. At least that of balanced builds: parting such scenes takes
-    /// longer anyway, and hasty planes below good ones cost rays more than they save.
-    pub fn for_even_parts(self) -> Effort {
-        let samples = self.samples.max(Effort::BALANCED.samples);
-        Effort { samples, one_axis: false, ..self }
     }
 
     /// Whether so uneven refs need no more than others.
@@ -186,15 +179,13 @@ pub(crate) fn best_plane(
 ) -> Option<Plane> {
     let binning = Binning::new(centres, refs.len(), effort.bins);
     let sample = refs.iter().step_by(effort.step(refs.len()).max(1));
-    let first = if effort.one_axis { centres.widest() } else { 0 };
-    let looked_at = if effort.one_axis { first..first + 1 } else { 0..3 };
-    if !(SMALL || effort.one_axis) {
+    if !SMALL {
         fill(axes, &binning, sample.clone());
     }
     let mut best = (f32::INFINITY, 0, 0);
-    for k in looked_at {
+    for k in 0..3 {
         let Some(axis) = axes.get_mut(k % AXES) else { break };
-        if SMALL || effort.one_axis {
+        if SMALL {
             axis.fill(&binning, k, sample.clone());
         }
         let (work, bin) = axis.best(binning.bins, areas);

@@ -93,7 +93,8 @@ pub(super) struct Grounds<'t> {
     pub ids: &'t [u32],
     pub areas: Areas,
     pub price: f32,
-    /// Whether leaves are not to be put together: visiting an instance costs more than telling it from others.
+    /// Whether leaves are not to be put together: visiting an instance costs more than telling it from others, and
+    /// [runs](super::runs) are whole leaf blocks.
     pub alone: bool,
 }
 
@@ -173,7 +174,7 @@ impl<const W: usize> Decided<W> {
         self.cost = [LEAF * areas.of(&self.aabb) + price; W];
         self.lanes = 1;
         self.content.count = count;
-        if is_sphere {
+        if grounds.alone || is_sphere {
             self.content.kind = if grounds.alone { Kind::Much } else { Kind::Spheres };
             return Some(());
         }

@@ -52,6 +52,15 @@ impl PrimRef {
         PrimRef { bounds: Box4 { lower, upper } }
     }
 
+    pub const NONE: PrimRef = PrimRef { bounds: Box4::ZERO };
+
+    /// Of no primitive yet; the first one gets this id.
+    pub fn run(id: usize) -> PrimRef {
+        let mut bounds = Box4::EMPTY;
+        (bounds.lower[3], bounds.upper[3]) = (f32::from_bits(id as u32 | Self::NORMAL), 0.0);
+        PrimRef { bounds }
+    }
+
     pub fn id(&self) -> u32 {
         self.bounds.lower[3].to_bits() & !Self::NORMAL
     }
@@ -63,6 +72,14 @@ impl PrimRef {
     /// The number of primitives: their ids are consecutive.
     pub fn count(&self) -> usize {
         self.bounds.upper[3].abs() as usize
+    }
+
+    /// Takes in another ref, whose primitives count from now on.
+    #[inline(always)]
+    pub fn take_in(&mut self, other: &PrimRef) {
+        let (id, count) = (self.bounds.lower[3], self.bounds.upper[3] + other.bounds.upper[3]);
+        self.bounds.add(&other.bounds);
+        (self.bounds.lower[3], self.bounds.upper[3]) = (id, count);
     }
 
     /// Takes in the triangle of the next id, if the area of both together is no more than the sum of each.

@@ -8,8 +8,10 @@ use super::collapse::Grounds;
 use super::compact;
 use super::emit::{Chosen, Sizes};
 use super::fill::{pack, take_marks_off};
+use super::places::{PAIR, Places};
 use super::refs::{PrimRef, gather, refs_per_prim};
 use super::reinsert::mend;
+use super::runs::{name_ids, put_into_runs};
 use super::split::Areas;
 use super::spread::unevenness_of_all;
 use super::tree::{Depth, Limits};
@@ -35,70 +37,8 @@ fn leaf_max(census: &Census, strip: usize) -> usize {
     }
 }
 
-/// Where the scratch lies: behind all that is finished.
-///
-/// ```text
-/// | header | geometries | refs             ...          | nodes |    growing
-/// | header | geometries | scratch   ...           | ids | nodes |    mending
-/// | header | geometries | ...         | choices | ids   | nodes |    choosing
-/// | header | geometries | prim_ids | bundles | choices | ids | nodes | emitting
-/// | header | geometries | prim_ids | bundles | spheres | triangles | packing
-/// ```
-struct Places {
-    refs: usize,
-    nodes: usize,
-    /// Refs at most: more than primitives, where some may be cut in two.
-    room: usize,
-    /// Leaves of the binary tree at most.
-    leaves: usize,
-}
-
-impl Places {
-    /// The places in memory of `size` bytes for what a scene without large primitives wants; `None` when
-    /// they do not fit.
-    fn new(survey: &Survey, census: &Census, size: usize) -> Option<Places> {
-        let mixed = census.is_mixed();
-        let room = census.hittable() as usize;
-        // More leaves, a half of the primitives or all, made no ray through an even scene faster: the collapse puts
-        // them together again.
-        let leaves = leaf_budget(room, mixed, leaf_max(census, 1), false);
-        let places = Places { refs: front(survey)?, nodes: 0, room, leaves };
-        places.fitting(room, leaves, size)
-    }
-
-    /// The same with other numbers of refs and leaves, if they fit.
-    fn fitting(&self, room: usize, leaves: usize, size: usize) -> Option<Places> {
-        let nodes = (size / ALIGNMENT * ALIGNMENT).checked_sub(leaves.checked_mul(PAIR)?)?;
-        let refs = self.refs;
-        let end = refs.checked_add(room.checked_mul(size_of::<PrimRef>())?)?;
-        (end <= nodes).then_some(Places { refs, nodes, room, leaves })
-    }
-
-    /// What `count` refs of an uneven scene want, as far as `size` bytes reach: a leaf for each of them, as a wall shall
-    /// not be in one with a chair; and, if refs may be cut, a quarter more of them, which takes half of what is free at most.
-    /// These places have room for so many refs and for `least` leaves.
-    fn for_uneven(self, count: usize, least: usize, cut: bool, size: usize) -> Places {
-        const REF: usize = size_of::<PrimRef>();
-        let end = self.nodes + self.leaves * PAIR;
-        let free = (end - self.refs).saturating_sub(count * REF + least * PAIR);
-        let more = if cut { (count / 4).min(free / (2 * REF)) } else { 0 };
-        let room = count + more;
-        let leaves = room.min(least + (free - more * REF) / PAIR).max(least);
-        self.fitting(room, leaves, size).unwrap_or(self)
-    }
-}
-
-/// What the nodes of one more leaf take.
-const PAIR: usize = 2 * size_of::<BvhNode>();
-
 /// What nodes, choice and id of a leaf of one primitive take.
 const SCRATCH: u64 = (PAIR + size_of::<u64>() + size_of::<u32>()) as u64;
-
-/// The end of header and geometries.
-fn front(survey: &Survey) -> Option<usize> {
-    let counts = Counts { geometries: survey.geometry_count, ..Counts::default() };
-    counts.offsets().map(|at| at.end)
-}
 
 /// The bytes for a good tree of bundles, and the bytes below which there is no tree at all.
 ///
@@ -180,7 +120,7 @@ fn build<const W: usize>(
 where
     Bundle<W>: Plain,
 {
-    let places = Places::new(survey, census, bytes.len())?;
+    let places = Places::new(survey, census, leaf_max(census, 1), bytes.len())?;
     how.caller.done(0.1)?;
     let scratch = grow_tree(scene, survey, census, places, how, bytes)?;
     how.caller.done(0.6)?;
@@ -220,26 +160,37 @@ fn grow_tree(
     let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
     geometries(scene, table.parts_mut(bytes)?.geometries);
     let areas = Areas::new(&census.bounds);
-    let refs = storage::view_mut::<PrimRef>(bytes, places.refs, places.room)?;
+    let size = bytes.len();
+    let (front, rest) = bytes.split_at_mut_checked(places.refs)?;
+    let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
+    let source = Source { scene, geometries, named: false };
+    let refs = storage::view_mut::<PrimRef>(rest, 0, places.room)?;
     let Gathered { count, strip, leaves } = gather_strips(scene, census, places.leaves, how, refs);
-    let unevenness = unevenness_of_all(refs.get(..count)?, areas, how.caller);
-    let uneven = how.effort.for_uneven(unevenness);
+    let refs = refs.get(..count)?;
+    let uneven = how.effort.for_uneven(unevenness_of_all(refs, areas, how.caller));
+    let prims = census.hittable();
+    let runs = match uneven {
+        None if how.effort.runs && census.triangle_count == prims => {
+            put_into_runs((count, prims as usize), &places, source, areas, rest)
+        }
+        _ => None,
+    };
     // Spheres are not cut, nor is what will move.
     let cut = uneven.is_some_and(|effort| effort.cuts) && census.sphere_count == 0 && !census.refit;
-    let places = match uneven {
-        Some(_) => places.for_uneven(count, leaves, cut, bytes.len()),
-        None => Places { leaves, ..places },
+    let in_runs = runs.is_some();
+    let places = match (runs, uneven) {
+        (Some(runs), _) => runs,
+        (None, Some(_)) => places.for_uneven(count, leaves, cut, size),
+        (None, None) => Places { leaves, ..places },
     };
-    let (front, tail) = bytes.split_at_mut_checked(places.nodes)?;
+    let (refs, tail) = rest.split_at_mut_checked(places.nodes - places.refs)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
-    let (front, refs) = front.split_at_mut_checked(places.refs)?;
     let slots = storage::view_mut::<PrimRef>(refs, 0, places.room)?;
-    let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
     let effort = uneven.unwrap_or(how.effort);
     let limits = Limits {
         leaves: places.leaves,
-        source: cut.then_some(Source { scene, geometries, named: false }),
-        leaf_max: leaf_max(census, strip),
+        source: cut.then_some(source),
+        leaf_max: if in_runs { 1 } else { leaf_max(census, strip) },
         mixed: census.is_mixed(),
         depth: match uneven {
             Some(_) => Depth::Alike,
@@ -247,14 +198,18 @@ fn grow_tree(
             None => Depth::Deep,
         },
         effort,
-        even: uneven.map(|_| how.effort.for_even_parts()),
+        even: uneven.map(|_| how.effort),
     };
+    let count = if in_runs { places.room } else { count };
     let size = grow(nodes, slots, count, &limits, how.caller)?;
     let (free, ids) = ids_to_end(refs, &size)?;
+    if in_runs {
+        name_ids(ids, free)?;
+    }
     if uneven.is_some() {
         mend(nodes.get_mut(..size.nodes)?, ids, areas, free)?;
     }
-    Scratch::new(&places, &size)
+    Some(Scratch { in_runs, ..Scratch::new(&places, &size)? })
 }
 
 /// So many refs, of as many as there would be at the least, and strips are not worth it.
@@ -326,6 +281,8 @@ struct Scratch {
     prims: usize,
     nodes: usize,
     node_count: usize,
+    /// Whether leaves are [runs](super::runs).
+    in_runs: bool,
 }
 
 impl Scratch {
@@ -334,7 +291,7 @@ impl Scratch {
         let ids = places.nodes - 4 * size.prims;
         let choices = (ids / 8 * 8).checked_sub(8 * pairs)?;
         let (prims, nodes, node_count) = (size.prims, places.nodes, size.nodes);
-        Some(Scratch { choices, pairs, ids, prims, nodes, node_count })
+        Some(Scratch { choices, pairs, ids, prims, nodes, node_count, in_runs: false })
     }
 
     fn choose<const W: usize>(
@@ -352,7 +309,7 @@ impl Scratch {
         let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
         let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
         let geometries = table.parts_mut(front)?.geometries;
-        let alone = census.is_index;
+        let alone = census.is_index || self.in_runs;
         let grounds = Grounds { nodes, ids, areas, price, alone };
         let source = Source { scene, geometries, named: census.refit };
         choose::<W>(&grounds, source, caller, choices)?;

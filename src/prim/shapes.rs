@@ -46,7 +46,7 @@ impl<'s, 'a> Shapes<'s, 'a> {
 
     /// Has the indices of a shape fetched into the cache, if it is of the last one's mesh.
     #[inline]
-    fn prefetch(&self, id: u32) {
+    pub fn prefetch(&self, id: u32) {
         let Some((first, mesh)) = &self.mesh else { return };
         if let Some(index) = mesh.first_index(id.wrapping_sub(*first) as usize) {
             prefetch(index);
@@ -60,6 +60,20 @@ impl<'s, 'a> Shapes<'s, 'a> {
         if let Some(vertices) = mesh.first_words(id.wrapping_sub(*first) as usize) {
             vertices.into_iter().for_each(prefetch);
         }
+    }
+
+    /// The numbers of a triangle's vertices, if they have any, and the first triangle of its mesh.
+    #[inline]
+    pub fn numbers(&mut self, id: u32) -> Option<(u32, [usize; 3])> {
+        let of_last = |(first, mesh): &(u32, Mesh)| {
+            let numbers = mesh.numbers(id.checked_sub(*first)? as usize)?;
+            mesh.is_indexed().then_some((*first, numbers))
+        };
+        if let Some(found) = self.mesh.as_ref().and_then(of_last) {
+            return Some(found);
+        }
+        self.find(id)?;
+        self.mesh.as_ref().and_then(of_last)
     }
 
     /// The shape with flat number `id`, whether it can be hit or not.
