@@ -41,7 +41,7 @@
 // `RtBuildOptions.quality`, for a BVH: surface area heuristic over 16 bins on each axis, for large
 // nodes by samples.
 #define RT_QUALITY_BALANCED 0
-// For a structure that is built often: the widest axis alone, fewer samples.
+// For a structure that is built often: leaves are runs of triangles along a curve.
 #define RT_QUALITY_FAST 1
 // For a structure that is built once: 32 bins, every primitive in them.
 #define RT_QUALITY_BEST 2

@@ -36,7 +36,8 @@ pub enum Quality {
     /// SAH over 16 bins on each axis, for large nodes by samples; pairs of triangles as one.
     #[default]
     Balanced,
-    /// For a structure that is built often: short strips of triangles as one, the widest axis alone, fewer samples.
+    /// For a structure that is built often: leaves are runs of triangles along a curve, unless a few are much larger than
+    /// the others.
     Fast,
     /// For a structure that is built once: 32 bins, every primitive in them.
     Best,

@@ -7,7 +7,7 @@ use super::versioned::{Growing, Versioned};
 /// `RtBuildOptions.quality`, for a BVH: surface area heuristic over 16 bins on each axis, for large
 /// nodes by samples.
 pub const RT_QUALITY_BALANCED: u32 = 0;
-/// For a structure that is built often: the widest axis alone, fewer samples.
+/// For a structure that is built often: leaves are runs of triangles along a curve.
 pub const RT_QUALITY_FAST: u32 = 1;
 /// For a structure that is built once: 32 bins, every primitive in them.
 pub const RT_QUALITY_BEST: u32 = 2;
