@@ -3,14 +3,14 @@
 use super::refs::PrimRef;
 use super::split::{Box4, Extent, centre, greater, lesser};
 
-/// Cells along each axis, as a power of two: with the number of a ref there are 63 bits.
+/// Cells along each axis, as a power of two: with the number of a ref these are 63 bits.
 const BITS: u32 = 11;
 /// Bits that one pass sorts by.
 const DIGIT: u32 = 11;
 const DIGITS: usize = (3 * BITS / DIGIT) as usize;
-const _: () = assert!(3 * BITS % DIGIT == 0 && 3 * BITS + NUMBER <= 64);
 /// A ref's number stands in so many of the lowest bits, its place on the curve above them.
 const NUMBER: u32 = 30;
+const _: () = assert!(DIGIT * DIGITS as u32 == 3 * BITS && 3 * BITS + NUMBER <= 64);
 
 /// Writes the refs in the order of their centres along the curve; those of one cell keep their order. `keys` and `spare`
 /// have room for as many words.
