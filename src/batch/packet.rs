@@ -305,6 +305,6 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
         let Some(ray) = rays[number].prepare(block.header.reach) else { return };
         let mut query = question.query(block, ray.t_max);
         let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
-        self.batch.write(number, Q::answer(block, &ray, &mut query, ended));
+        self.batch.write(number, Q::answer(Scalar, block, &ray, &mut query, ended));
     }
 }
