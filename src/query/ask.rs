@@ -4,19 +4,22 @@ use super::waiting::Waiting;
 use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
 use crate::block::leaf::TriangleBlock;
 use crate::ray::{Interval, PreparedRay};
+use crate::simd::SMALL;
 
 /// The closest hit: least `t`, and of equal ones the first primitive.
 ///
-/// `MEMORY` is 1 to let triangles [wait](Waiting) and to remember what comparisons of the best hit took, which ties make use
-/// of, or 0 to be small.
+/// `MEMORY` is 1 to remember what comparisons of the best hit took, which ties make use of, or 0 to be small.
 pub(crate) struct Closest<'m, D: Decide, W, const MEMORY: usize> {
     filter: Filter<'m>,
     t_bound: f32,
-    waiting: [Waiting<'m>; MEMORY],
+    waiting: [Waiting<'m>; WAITS],
     pub best: Option<D::Met>,
     memory: [D::Memory; MEMORY],
     pub watch: W,
 }
+
+/// How many triangles may wait: none where code shall be small.
+const WAITS: usize = if SMALL { 0 } else { 1 };
 
 impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     #[inline(always)]
@@ -78,7 +81,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
     type Watch = W;
     const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = true;
-    const CAN_WAIT: bool = D::ANY_BOXES && MEMORY > 0;
+    const CAN_WAIT: bool = D::ANY_BOXES && WAITS > 0;
 
     #[inline(always)]
     fn may_wait(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
