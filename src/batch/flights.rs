@@ -61,7 +61,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
                     continue;
                 }
                 if let Turn::Ended(ended) = turn {
-                    self.write(*number, Q::answer(self.block, ray, query, ended));
+                    self.write(*number, Q::answer(s, self.block, ray, query, ended));
                 } else {
                     self.answer_alone(*number);
                 }

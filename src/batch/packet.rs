@@ -250,7 +250,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
             if ended {
                 self.met[group] |= 1 << lane;
-            } else if let Some((leaf, t)) = Q::best(&query) {
+            } else if let Some((leaf, t)) = Q::best(&mut query, &ray) {
                 // Away from zero by more than the rounding of this.
                 let rate = f64::from(given.direction[self.packet.alike.axes[2]].abs())
                     * f64::from(self.packet.alike.scale);
@@ -305,6 +305,6 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
         let Some(ray) = rays[number].prepare(block.header.reach) else { return };
         let mut query = question.query(block, ray.t_max);
         let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
-        self.batch.write(number, Q::answer(block, &ray, &mut query, ended));
+        self.batch.write(number, Q::answer(Scalar, block, &ray, &mut query, ended));
     }
 }

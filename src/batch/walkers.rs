@@ -147,15 +147,15 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>, S: Simd> Walkers<'_, 'm, 
     /// Writes the answer of a ray, and gives its place to the next.
     #[inline(always)]
     fn end(&mut self, s: S, lane: usize, ended: bool) {
-        self.answer(lane, ended);
+        self.answer(s, lane, ended);
         self.take_up(s, lane);
     }
 
     /// Writes the answer of a ray.
     #[inline(always)]
-    fn answer(&mut self, lane: usize, ended: bool) {
+    fn answer(&mut self, s: S, lane: usize, ended: bool) {
         if let Walker { number, ray, query: Some(query), .. } = &mut self.walkers[lane % 16] {
-            let answer = Q::answer(self.batch.block, ray, query, ended);
+            let answer = Q::answer(s, self.batch.block, ray, query, ended);
             self.batch.write(*number, answer);
         }
     }
@@ -180,7 +180,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>, S: Simd> Walkers<'_, 'm, 
                     self.going |= 1 << lane;
                     return;
                 }
-                Turn::Ended(ended) => self.answer(lane, ended),
+                Turn::Ended(ended) => self.answer(s, lane, ended),
             }
         }
     }

@@ -9,6 +9,7 @@ use crate::query::{
     flat_number,
 };
 use crate::ray::{Hit, NONE, PreparedRay, Ray};
+use crate::simd::Simd;
 use crate::trace::{self, LocateHit, Question};
 
 /// A hit among all that a ray has: its primitive, which of two roots, and its `t`.
@@ -161,7 +162,13 @@ impl<'m, 'h> Question<'m> for HitsAfter<'h> {
         NextHits::new(filter, block, self.after.as_ref(), t_max, self.hits)
     }
 
-    fn answer(block: &Block, ray: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
+    fn answer<S: Simd>(
+        _: S,
+        block: &Block,
+        ray: &PreparedRay,
+        query: &mut Self::Query,
+        _: bool,
+    ) -> Self::Answer {
         query.finish(ray, |met| {
             let t = Exact::t(ray, met, &mut ());
             let hit = trace::record(block, met.place(), t, Exact::weights(met));

@@ -244,6 +244,12 @@ impl<Q: Query> Kernel for Look<'_, Q> {
         // Neither `t` nor order matters to those that want any hit.
         let inside = if Q::ORDERED { 0 } else { found.inside(s, ray) };
         let alone = found.candidates.is_power_of_two();
+        if Q::CAN_WAIT && alone && found.sure != 0 {
+            let lane = found.sure.trailing_zeros();
+            if query.may_wait(ray, number, lane, found.part(s, ray, lane)) {
+                return false;
+            }
+        }
         if alone || inside != 0 {
             let lane = if inside == 0 { found.candidates } else { inside }.trailing_zeros();
             let certain = Certain { sure: found.sure >> lane & 1 == 1, inside: inside != 0 };
@@ -285,8 +291,11 @@ impl<Q: Query> Kernel for Several<'_, Q> {
         while rest != 0 {
             let lane = found.nearest(s, rest);
             rest &= !(1 << lane);
-            let certain = Certain { sure: sure >> lane & 1 == 1, inside: false };
-            if consider(block, number, lane, certain, ray, query) {
+            let sure = sure >> lane & 1 == 1;
+            let waits =
+                Q::CAN_WAIT && sure && query.may_wait(ray, number, lane, found.part(s, ray, lane));
+            let certain = Certain { sure, inside: false };
+            if !waits && consider(block, number, lane, certain, ray, query) {
                 return true;
             }
             // What was found in a lane may be nearer than others.

@@ -1,7 +1,10 @@
 //! The questions: the closest hit, any hit, a known hit.
 
+use super::waiting::Waiting;
 use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
-use crate::ray::PreparedRay;
+use crate::block::leaf::TriangleBlock;
+use crate::ray::{Interval, PreparedRay};
+use crate::simd::SMALL;
 
 /// The closest hit: least `t`, and of equal ones the first primitive.
 ///
@@ -9,20 +12,41 @@ use crate::ray::PreparedRay;
 pub(crate) struct Closest<'m, D: Decide, W, const MEMORY: usize> {
     filter: Filter<'m>,
     t_bound: f32,
+    waiting: [Waiting<'m>; WAITS],
     pub best: Option<D::Met>,
     memory: [D::Memory; MEMORY],
     pub watch: W,
 }
 
+/// How many triangles may wait: none where code shall be small.
+const WAITS: usize = if SMALL { 0 } else { 1 };
+
 impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     #[inline(always)]
-    pub fn new(filter: Filter<'m>, t_max: f32, watch: W) -> Self {
+    pub fn new(filter: Filter<'m>, blocks: &'m [TriangleBlock], t_max: f32, watch: W) -> Self {
         Closest {
+            waiting: core::array::from_fn(|_| Waiting::new(blocks, &filter, t_max)),
             filter,
             t_bound: t_max,
             best: None,
             memory: core::array::from_fn(|_| D::Memory::default()),
             watch,
+        }
+    }
+
+    /// The triangle of which the rest waits until the end.
+    #[inline(always)]
+    pub fn waiting(&self) -> Option<TriangleLane<'m>> {
+        self.waiting.first()?.lane()
+    }
+
+    /// Computes what waits. Nothing else was met then.
+    #[inline(always)]
+    pub fn settle(&mut self, ray: &PreparedRay) {
+        if let Some(lane) = self.waiting.first_mut().and_then(Waiting::end)
+            && let Some((met, in_doubt)) = &D::likely(ray, &lane, &mut self.watch)
+        {
+            self.consider(ray, met, *in_doubt);
         }
     }
 
@@ -57,6 +81,16 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
     type Watch = W;
     const ANY_BOXES: bool = D::ANY_BOXES;
     const ORDERED: bool = true;
+    const CAN_WAIT: bool = D::ANY_BOXES && WAITS > 0;
+
+    #[inline(always)]
+    fn may_wait(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
+        let waits = self.waiting.first_mut().is_some_and(|w| w.takes(ray, block, lane, part));
+        if waits {
+            self.t_bound = part.far;
+        }
+        waits
+    }
 
     #[inline(always)]
     fn t_bound(&self) -> f32 {
@@ -65,6 +99,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
 
     #[inline(always)]
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
+        self.settle(ray);
         self.filter.fetch(lane.place);
         // What was offered once is not computed again.
         let known = match &self.best {
@@ -83,6 +118,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
     }
 
     fn sphere(&mut self, ray: &PreparedRay, lane: &SphereLane) -> bool {
+        self.settle(ray);
         if self.filter.sees(lane.place, false) {
             for met in D::sphere(ray, lane, &mut self.watch).into_iter().flatten() {
                 if self.filter.sees(lane.place, met.skippable()) {

@@ -228,6 +228,14 @@ impl Decide for Exact {
     const ANY_BOXES: bool = true;
     type Memory = ExactMemory;
 
+    #[inline(always)]
+    fn sure<S: Simd>(s: S, ray: &PreparedRay, lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
+        let PlaneMeeting { t, t_error, weights: [u, v], clear, .. } =
+            PlaneMeeting::by(s, &ray.given.rows(), &lane.corners().map(|[x, y, z]| [x, y, z, 0.0]));
+        let t = surely_rounded(interval(t, t_error), t).filter(|_| clear != 0)?;
+        Some((t, clamped_weights([u as f32, v as f32])))
+    }
+
     /// In line where room is no matter.
     #[cfg_attr(target_pointer_width = "64", inline(always))]
     #[cfg_attr(not(target_pointer_width = "64"), inline(never))]

@@ -9,6 +9,7 @@ mod erased;
 mod exact;
 mod hits;
 mod options;
+mod waiting;
 mod watertight;
 
 pub(crate) use ask::{Any, Closest, Either, Locate, Wanted};
@@ -22,8 +23,9 @@ pub(crate) use watertight::Watertight;
 
 use crate::block::leaf::{Place, TriangleBlock};
 use crate::math::float::limited;
-use crate::ray::PreparedRay;
+use crate::ray::{Interval, PreparedRay};
 use crate::sieve::SphereDetail;
+use crate::simd::Simd;
 
 /// What a query did, for charts and heat maps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -163,6 +165,16 @@ pub(crate) trait Query {
     /// Nothing beyond this `t` of the frame is of interest any more.
     fn t_bound(&self) -> f32;
 
+    /// Whether triangles that surely are met may wait until the end.
+    const CAN_WAIT: bool = false;
+
+    /// A triangle in a lane of a block between whose edges the ray surely passes, in this part of itself: whether it may wait,
+    /// and need not be considered.
+    #[inline(always)]
+    fn may_wait(&mut self, _: &PreparedRay, _block: u32, _lane: u32, _: Interval<f32>) -> bool {
+        false
+    }
+
     /// Considers a triangle; true ends the traversal.
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool;
 
@@ -197,6 +209,12 @@ pub(crate) trait Decide {
     ) -> Option<Self::Met> {
         let (met, in_doubt) = Self::likely(ray, lane, watch)?;
         (!in_doubt || Self::is_met(ray, &met, watch)).then_some(met)
+    }
+
+    /// `t` and weights of a triangle that the ray surely meets within its limits, if that takes no more than a look.
+    #[inline(always)]
+    fn sure<S: Simd>(_: S, _ray: &PreparedRay, _lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
+        None
     }
 
     /// The same, and whether it is in doubt: then [`is_met`](Self::is_met) tells.

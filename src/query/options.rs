@@ -116,6 +116,12 @@ impl<'m> Filter<'m> {
         Filter { geometries, prim_ids, choice }
     }
 
+    /// Whether every meeting counts.
+    #[inline(always)]
+    pub fn sees_all(&self) -> bool {
+        self.choice.mask == 0 && self.choice.skip == NONE && self.both_sides()
+    }
+
     /// Whether a meeting with the primitive stored there counts; only those that are `skippable` are
     /// skipped.
     #[inline(always)]

@@ -3,8 +3,7 @@
 use super::exponents::rounded;
 use super::{Axis, Ray};
 use crate::exact::Line;
-use crate::math::rounding::{Round, UNIT32, f32_above, f32_below};
-use crate::simd::SMALL;
+use crate::math::rounding::{Round, UNIT32, f32_above};
 
 /// A ray that can hit something, with what every box and primitive test needs of it.
 ///
@@ -47,6 +46,8 @@ pub(crate) struct Shear {
     pub origin_depth: f32,
     /// Depth from there for each unit of `t` in the frame, between 1 and 2.
     pub depth_rate: f32,
+    /// `t` for each unit of depth: the reciprocal of `depth_rate`.
+    pub pace: f32,
     /// Below the depth of all `t` of interest, from the origin.
     pub low: f32,
 }
@@ -108,6 +109,7 @@ impl Shear {
             depth_scale: signed(scale),
             origin_depth: signed(origin[depth]),
             depth_rate,
+            pace: inverse,
             low: low - depth_slack(low),
         }
     }
@@ -130,6 +132,7 @@ impl PreparedRay {
             depth_scale: 0.0,
             origin_depth: 0.0,
             depth_rate: 0.0,
+            pace: 0.0,
             low: 0.0,
         },
     };
@@ -138,17 +141,6 @@ impl PreparedRay {
     #[inline(always)]
     pub fn line(&self) -> Line {
         self.given.line()
-    }
-
-    /// Within all `t` of interest: the limits rounded inwards.
-    #[inline(always)]
-    pub fn t_inside(&self) -> [f32; 2] {
-        let Ray { t_min, t_max, .. } = self.given;
-        if SMALL {
-            let n = self.t_exponent();
-            return [rounded(t_min, n, Round::Above), rounded(t_max, n, Round::Below)];
-        }
-        [f32_above(f64::from(t_min) * self.t_scale), f32_below(f64::from(t_max) * self.t_scale)]
     }
 
     /// The nearest given `t` to a finite one of the frame.
@@ -162,11 +154,12 @@ impl PreparedRay {
     }
 
     /// What lies between these depths, from the origin, surely is of interest.
+    ///
+    /// The frame's limits are less than an ulp outside of the given ones, so twice the slack is enough.
     #[inline(always)]
     pub fn inner_depths(&self) -> [f32; 2] {
-        let [t_min, t_max] = self.t_inside();
-        let (low, high) = (t_min * self.shear.depth_rate, t_max * self.shear.depth_rate);
-        [low + depth_slack(low), high - depth_slack(high)]
+        let [low, high] = [self.t_min, self.t_max].map(|t| t * self.shear.depth_rate);
+        [low + 2.0 * depth_slack(low), high - 2.0 * depth_slack(high)]
     }
 
     /// A float of the frame that is not below the given `t` plus its `error`, and not far above.

@@ -273,8 +273,7 @@ mod tests {
                     // The same point from both descriptions.
                     let given = f64::from(length) * f64::from(ray.scale);
                     assert_eq!(given, f64::from(ray.direction[0]) * ray.t_scale);
-                    assert_eq!((ray.t_min, ray.t_inside()[0]), (0.0, 0.0));
-                    assert!(ray.t_max >= ray.t_inside()[1]);
+                    assert_eq!(ray.t_min, 0.0);
                 }
             }
         }

@@ -14,7 +14,7 @@ use super::triangle::single::{Sieved, area, area_error, coordinate_error, sheare
 use crate::exact::{Distance, Line, Meeting};
 use crate::interval;
 use crate::math::{sum_abs, wide};
-use crate::ray::{PreparedRay, Ray};
+use crate::ray::{Interval, PreparedRay, Ray};
 
 /// Exponents of coordinates: all, either end, ordinary ones, and nearly one size.
 const RANGES: [[i32; 2]; 6] = [[-149, 127], [-149, -120], [100, 127], [-20, 20], [-2, 2], [-2, 2]];
@@ -89,6 +89,7 @@ struct TriangleWorst {
     area: Worst,
     rise: Worst,
     t: Worst,
+    part: Worst,
 }
 
 /// What the sieve says of one case, against real arithmetic; false where it is wrong.
@@ -115,7 +116,9 @@ fn triangle_is_right(random: &mut Random, worst: &mut TriangleWorst) -> bool {
         Some(_) if sieved.rejected => !hit(),
         Some(met) => {
             let side = sieved.detail.front.is_none_or(|front| front == met.front);
-            side && (!sieved.inside || hit())
+            let Interval { near, far } = sieved.part;
+            let within = sieved.sure && ray.t_min < near && far < ray.t_max;
+            side && (!(sieved.inside || within) || hit())
         }
         None => sieved.rejected || !sieved.sure && !sieved.inside,
     };
@@ -171,6 +174,10 @@ fn see_triangle(
         let granted = f64::from(*error) / total;
         let rounded = depth.abs() + f64::from(*middle - ray.shear.origin_depth).abs();
         worst.t.see(off, granted + rounded * 2f64.powi(-22) + 2f64.powi(-140));
+        let (t, own) = (t * ray.t_scale, depth.abs() * 2f64.powi(-48));
+        let (near, far) = (f64::from(sieved.part.near), f64::from(sieved.part.far));
+        let (middle, half) = ((near + far) / 2.0, (far - near) / 2.0);
+        worst.part.see(t - middle, half + own);
     }
 }
 
@@ -184,6 +191,7 @@ fn triangles() {
         area: Worst::new("triangle, f32: area"),
         rise: Worst::new("triangle, f32: rise"),
         t: Worst::new("triangle, f32: t of the watertight mode"),
+        part: Worst::new("triangle, f32: part of the ray"),
     };
     for sample in 0..samples(1_000_000) {
         let before = random.clone();
@@ -194,6 +202,7 @@ fn triangles() {
     worst.area.assert_tight(0.1);
     worst.rise.assert_tight(0.02);
     worst.t.assert_tight(0.02);
+    worst.part.assert_tight(0.02);
 }
 
 struct SphereWorst {

@@ -3,7 +3,7 @@
 use super::areas::Areas;
 use crate::math::Aabb;
 use crate::math::rounding::UNIT32;
-use crate::ray::{PreparedRay, TINY};
+use crate::ray::{Interval, PreparedRay, TINY};
 use crate::simd::{Lanes, Scalar, Width, mul_add, mul_sub};
 
 /// The middle of a box along rays: depths near it are small numbers, wherever a ray starts.
@@ -171,6 +171,19 @@ impl<V: Copy> Meetings<V> {
         low.less(s.splat(0.0).sub(self.error)) & self.error.less(high)
     }
 
+    /// Those of one lane.
+    #[inline(always)]
+    pub fn lane<S: Width<N, V = V>, const N: usize>(&self, s: S, lane: u32) -> Meetings<[f32; 1]>
+    where
+        V: Lanes<N>,
+    {
+        Meetings {
+            total: [s.lane(self.total, lane)],
+            rise: [s.lane(self.rise, lane)],
+            error: [s.lane(self.error, lane)],
+        }
+    }
+
     /// In memory.
     #[inline(always)]
     pub fn stored<const N: usize>(&self) -> Meetings<[f32; N]>
@@ -182,6 +195,21 @@ impl<V: Copy> Meetings<V> {
         self.rise.store(&mut stored.rise);
         self.error.store(&mut stored.error);
         stored
+    }
+}
+
+impl Meetings<[f32; 1]> {
+    /// The part of the ray in which it meets the plane, by `t` of the frame, if it surely passes between the edges. Rounding
+    /// takes some `6 u` of what is added up.
+    #[inline(always)]
+    pub fn part(&self, middle: &Middle<[f32; 1]>, ray: &PreparedRay) -> Interval<f32> {
+        let ([total], [rise], [error]) = (self.total, self.rise, self.error);
+        let ([middle], inverse) = (middle.depth, 1.0 / total);
+        let (above, error) = (rise * inverse, error * inverse);
+        let slack = (middle.abs() + above.abs() + error) * (8.0 * UNIT32) + TINY;
+        let (near, far) = (above - (error + slack), above + (error + slack));
+        let pace = ray.shear.pace;
+        Interval { near: (middle + near) * pace, far: (middle + far) * pace }
     }
 }
 

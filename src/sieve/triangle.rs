@@ -3,7 +3,7 @@
 use super::areas::{Across, Along, AreaError, Areas, shared_error};
 use super::meetings::{Meetings, Middle};
 use crate::block::leaf::TriangleBlock;
-use crate::ray::PreparedRay;
+use crate::ray::{Interval, PreparedRay};
 use crate::simd::{Lanes, NUMBERS, Scalar, Simd, Width};
 
 /// What is left of a block, one bit a lane.
@@ -43,6 +43,17 @@ impl<V: Lanes<16>> Triangles<V> {
     pub fn up_to<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
         let window = self.middle.window(Scalar, limits(ray, t_bound));
         !self.meetings.outside::<S, false, 16>(s, splat(s, window))
+    }
+
+    /// The part of the ray in which it meets the plane of a sure lane, by `t` of the frame.
+    #[inline(always)]
+    pub fn part<S: Simd + Width<16, V = V>>(
+        &self,
+        s: S,
+        ray: &PreparedRay,
+        lane: u32,
+    ) -> Interval<f32> {
+        self.meetings.lane(s, lane).part(&self.middle, ray)
     }
 
     /// In memory, for those whom registers cannot be lent to.
@@ -261,7 +272,9 @@ fn sheared(ray: &PreparedRay, vertex: &[f32; 3]) -> Sheared {
 #[cfg(test)]
 pub(super) mod single {
     use super::super::detail::{TriangleDetail, detail};
-    use super::{Across, Along, AreaError, Middle, One, PreparedRay, Scalar, limits, shared_error};
+    use super::{
+        Across, Along, AreaError, Interval, Middle, One, PreparedRay, Scalar, limits, shared_error,
+    };
     use crate::math::Aabb;
     use crate::math::rounding::UNIT32;
 
@@ -302,6 +315,8 @@ pub(super) mod single {
         pub rise: f32,
         pub error: f32,
         pub detail: TriangleDetail,
+        /// Where it is met, if it is sure.
+        pub part: Interval<f32>,
     }
 
     pub fn sieve(ray: &PreparedRay, t_bound: f32, corners: [[f32; 3]; 3]) -> Sieved {
@@ -322,6 +337,7 @@ pub(super) mod single {
             rise,
             error,
             detail: detail(ray, corners),
+            part: meetings.part(&middle, ray),
         }
     }
 }

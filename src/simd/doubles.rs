@@ -106,10 +106,65 @@ impl Halves for [f64; 8] {
     }
 }
 
+/// Four doubles: the three numbers of a vector, and one beside it.
+pub(crate) trait Quad: Doubles {
+    /// Its second, third and first number, and what is beside them.
+    fn turned(self) -> Self;
+    /// Its first number in all lanes.
+    fn first(self) -> Self;
+    /// Of each vector the sum of its first two numbers, and of that and the third. What is beside them does not count.
+    fn sums(vectors: [Self; 4]) -> Self;
+    fn array(self) -> [f64; 4];
+}
+
+impl Doubles for [f64; 4] {
+    each!(add sub mul div);
+
+    fn times(self, factor: f64) -> Self {
+        self.map(|x| x * factor)
+    }
+
+    fn abs(self) -> Self {
+        self.map(Doubles::abs)
+    }
+
+    fn neg(self) -> Self {
+        self.map(|x| -x)
+    }
+
+    fn less(self, other: Self) -> u32 {
+        (0..4).fold(0, |bits, i| bits | self[i].less(other[i]) << i)
+    }
+}
+
+impl Quad for [f64; 4] {
+    fn turned(self) -> Self {
+        let [x, y, z, w] = self;
+        [y, z, x, w]
+    }
+
+    fn first(self) -> Self {
+        [self[0]; 4]
+    }
+
+    fn sums(vectors: [Self; 4]) -> Self {
+        vectors.map(|[x, y, z, _]| x + y + z)
+    }
+
+    fn array(self) -> [f64; 4] {
+        self
+    }
+}
+
 /// The doubles of a backend that has none of its own.
 macro_rules! doubles_one_by_one {
     () => {
         type Doubles = [f64; 8];
+        type Quad = [f64; 4];
+
+        fn quad(self, floats: &[f32; 4]) -> [f64; 4] {
+            floats.map(f64::from)
+        }
 
         fn widened(self, floats: &[f32; 8]) -> [f64; 8] {
             floats.map(f64::from)

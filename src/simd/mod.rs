@@ -38,7 +38,7 @@ mod tests;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, Ordering};
 
-pub(crate) use doubles::{Doubles, Halves};
+pub(crate) use doubles::{Doubles, Halves, Quad};
 pub(crate) use scalar::Scalar;
 
 /// Whether code had better be small than fast: where there are no vectors, lanes go one by one and questions share their
@@ -94,6 +94,7 @@ pub(crate) trait Width<const N: usize>: Copy {
     type V: Lanes<N>;
     fn splat(self, x: f32) -> Self::V;
     fn load(self, lanes: &[f32; N]) -> Self::V;
+
     /// `chosen` in the lanes of `mask`, `other` in the rest.
     #[inline(always)]
     fn select(self, mask: u32, chosen: Self::V, other: Self::V) -> Self::V {
@@ -104,6 +105,14 @@ pub(crate) trait Width<const N: usize>: Copy {
             *lane = if mask >> i & 1 == 1 { *lane } else { other };
         }
         self.load(&lanes)
+    }
+
+    /// One lane.
+    #[inline(always)]
+    fn lane(self, v: Self::V, lane: u32) -> f32 {
+        let mut lanes = [0.0; N];
+        v.store(&mut lanes);
+        lanes[lane as usize % N]
     }
 
     /// The largest lane, of which none is a NaN.
@@ -194,6 +203,12 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
 
     /// Eight doubles.
     type Doubles: Halves;
+
+    /// Four doubles.
+    type Quad: Quad;
+
+    /// Four floats as doubles.
+    fn quad(self, floats: &[f32; 4]) -> Self::Quad;
 
     /// The same four in both halves.
     fn twice(self, four: &[f64; 4]) -> Self::Doubles;

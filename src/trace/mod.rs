@@ -27,7 +27,8 @@ pub(crate) trait Question<'m> {
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query;
 
     /// The answer, from a query that a traversal has fed; `ended` is whether it ended the search.
-    fn answer(
+    fn answer<S: Simd>(
+        s: S,
         block: &Block<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
@@ -91,7 +92,7 @@ impl<'m, Q: Question<'m>, const SOON: bool> Kernel for Ask<'_, 'm, Q, SOON> {
         };
         // Nothing that is not prepared has met anything.
         let Some(ray) = &prepared else { return Q::nothing() };
-        Q::answer(block, ray, &mut query, ended)
+        Q::answer(s, block, ray, &mut query, ended)
     }
 }
 
@@ -114,7 +115,7 @@ fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> 
         false => trace_any(block, &mut prepared, &slab, Erased::<false>(&mut query)),
     };
     let Some(ray) = &prepared else { return Q::nothing() };
-    Q::answer(block, ray, &mut query, ended)
+    Q::answer(Scalar, block, ray, &mut query, ended)
 }
 
 /// [`trace`] for queries of any type.

@@ -2,13 +2,13 @@
 
 use core::marker::PhantomData;
 
-use super::{Question, ask, hit};
+use super::{Question, ask, hit, record};
 use crate::block::{Block, Finished};
 use crate::query::{
     Any, Choice, Closest, Decide, Either, Exact, ExactMet, Filter, Locate, Wanted, Watch,
 };
 use crate::ray::{Hit, PreparedRay, Ray};
-use crate::simd::SMALL;
+use crate::simd::{SMALL, Simd};
 
 /// The closest hit that the filter leaves; `MEMORY` as for [`Closest`].
 #[derive(Clone, Copy)]
@@ -51,16 +51,23 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question<'m> for ClosestHit<D
     #[inline(always)]
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
         let filter = Filter::new(self.choice, block.geometries, block.prim_ids);
-        Closest::new(filter, t_max, self.watch)
+        Closest::new(filter, block.triangle_blocks, t_max, self.watch)
     }
 
     #[inline(always)]
-    fn answer(
+    fn answer<S: Simd>(
+        s: S,
         block: &Block,
         ray: &PreparedRay,
         query: &mut Self::Query,
         _ended: bool,
     ) -> Option<Hit> {
+        if let Some(lane) = query.waiting() {
+            if let Some((t, weights)) = D::sure(s, ray, &lane) {
+                return Some(record(block, lane.place, t, weights));
+            }
+            query.settle(ray);
+        }
         let Closest { best, watch, .. } = query;
         Some(hit::<D>(block.whole, ray, best.as_ref()?, watch))
     }
@@ -82,7 +89,7 @@ impl<'m, D: Decide, W: Watch> Question<'m> for AnyHit<D, W> {
     }
 
     #[inline(always)]
-    fn answer(_: &Block, _: &PreparedRay, _: &mut Self::Query, ended: bool) -> bool {
+    fn answer<S: Simd>(_: S, _: &Block, _: &PreparedRay, _: &mut Self::Query, ended: bool) -> bool {
         ended
     }
 
@@ -109,7 +116,8 @@ impl<'m, D: Decide, W: Watch> Question<'m> for EitherHit<D, W> {
         Either { closest: ClosestHit::new(choice, watch).query(block, t_max), any }
     }
 
-    fn answer(
+    fn answer<S: Simd>(
+        s: S,
         block: &Block<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
@@ -117,7 +125,7 @@ impl<'m, D: Decide, W: Watch> Question<'m> for EitherHit<D, W> {
     ) -> Option<Hit> {
         match query.any {
             true => ended.then_some(Hit::MISS),
-            false => ClosestHit::<D, W, 0>::answer(block, ray, &mut query.closest, ended),
+            false => ClosestHit::<D, W, 0>::answer(s, block, ray, &mut query.closest, ended),
         }
     }
 
@@ -169,7 +177,13 @@ impl<'m, D: Decide> Question<'m> for LocateHit<D> {
     }
 
     #[inline(always)]
-    fn answer(_: &Block, _: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
+    fn answer<S: Simd>(
+        _: S,
+        _: &Block,
+        _: &PreparedRay,
+        query: &mut Self::Query,
+        _: bool,
+    ) -> Self::Answer {
         query.found
     }
 
@@ -189,10 +203,20 @@ impl<'m> Question<'m> for ClosestMet {
     const RARE: bool = true;
 
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        Closest::new(Filter::new(self.0, block.geometries, block.prim_ids), t_max, ())
+        {
+            let filter = Filter::new(self.0, block.geometries, block.prim_ids);
+            Closest::new(filter, block.triangle_blocks, t_max, ())
+        }
     }
 
-    fn answer(_: &Block, _: &PreparedRay, query: &mut Self::Query, _: bool) -> Self::Answer {
+    fn answer<S: Simd>(
+        _: S,
+        _: &Block,
+        ray: &PreparedRay,
+        query: &mut Self::Query,
+        _: bool,
+    ) -> Self::Answer {
+        query.settle(ray);
         query.best
     }
 

@@ -5,7 +5,7 @@ use crate::block::Block;
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place};
 use crate::math::Bits;
 use crate::query::{Exact, SureMeetings};
-use crate::ray::{Abreast, Hit, Interval, NONE};
+use crate::ray::{Abreast, Hit, Interval, NONE, PreparedRay};
 use crate::simd::Simd;
 
 /// What each of sixteen rays meets before all others: a lane of a leaf block.
@@ -63,7 +63,7 @@ pub(crate) trait Together<'m>: Question<'m> + Copy {
     ) -> u32;
 
     /// What a query was offered before all else, and the `t` between which it is met.
-    fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)>;
+    fn best(query: &mut Self::Query, ray: &PreparedRay) -> Option<(LeafRef, Interval<f64>)>;
 }
 
 impl<'m, const MEMORY: usize> Together<'m> for ClosestHit<Exact, (), MEMORY> {
@@ -118,7 +118,8 @@ impl<'m, const MEMORY: usize> Together<'m> for ClosestHit<Exact, (), MEMORY> {
         unsettled
     }
 
-    fn best(query: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
+    fn best(query: &mut Self::Query, ray: &PreparedRay) -> Option<(LeafRef, Interval<f64>)> {
+        query.settle(ray);
         query.best.as_ref().map(|met| (met.leaf(), met.interval()))
     }
 }
@@ -144,7 +145,7 @@ impl<'m> Together<'m> for AnyHit<Exact, ()> {
         0
     }
 
-    fn best(_: &Self::Query) -> Option<(LeafRef, Interval<f64>)> {
+    fn best(_: &mut Self::Query, _: &PreparedRay) -> Option<(LeafRef, Interval<f64>)> {
         None
     }
 }

@@ -8,7 +8,7 @@
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
-use super::doubles::D44;
+use super::doubles::{D4, D44};
 use super::sort;
 use super::sse2::F4;
 use crate::simd::doubled::{Two, halves};
@@ -258,6 +258,13 @@ impl Simd for Avx2 {
     const FLIES: bool = true;
 
     type Doubles = D44;
+    type Quad = D4;
+
+    #[inline(always)]
+    fn quad(self, floats: &[f32; 4]) -> D4 {
+        // SAFETY: the token proves that the instructions exist.
+        unsafe { D4::widened(floats) }
+    }
 
     #[inline(always)]
     fn widened(self, floats: &[f32; 8]) -> D44 {

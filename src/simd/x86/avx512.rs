@@ -9,7 +9,7 @@ use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
 use super::avx2::F8;
-use super::doubles::D8;
+use super::doubles::{D4, D8};
 use super::sort;
 use super::sse2::F4;
 use crate::simd::{Kernel, Lanes, Simd, Width};
@@ -66,6 +66,14 @@ width! {
     fn select(self, mask: u32, chosen: F16, other: F16) -> F16 {
         // SAFETY: the token proves AVX-512 F.
         F16(unsafe { _mm512_mask_mov_ps(other.0, mask as __mmask16, chosen.0) })
+    }
+
+    #[inline(always)]
+    fn lane(self, v: F16, lane: u32) -> f32 {
+        // SAFETY: the token proves AVX-512 F.
+        unsafe {
+            _mm512_cvtss_f32(_mm512_permutexvar_ps(_mm512_set1_epi32(lane as i32), v.0))
+        }
     }
 
     #[inline(always)]
@@ -260,6 +268,13 @@ impl Simd for Avx512 {
     const FLIES: bool = true;
 
     type Doubles = D8;
+    type Quad = D4;
+
+    #[inline(always)]
+    fn quad(self, floats: &[f32; 4]) -> D4 {
+        // SAFETY: the token proves that the instructions exist.
+        unsafe { D4::widened(floats) }
+    }
 
     #[inline(always)]
     fn widened(self, floats: &[f32; 8]) -> D8 {

@@ -7,7 +7,7 @@
 
 use core::arch::x86_64::*;
 
-use crate::simd::doubles::{Doubles, Halves};
+use crate::simd::doubles::{Doubles, Halves, Quad};
 
 /// In one register of AVX-512: such a value is made from a token, so the instructions exist.
 #[derive(Clone, Copy)]
@@ -220,5 +220,88 @@ impl Halves for D44 {
         D44(unsafe {
             [_mm256_blend_pd::<8>(low, beside), _mm256_blend_pd::<8>(high, _mm256_set1_pd(second))]
         })
+    }
+}
+
+/// Four of them, in one register of AVX2, likewise.
+#[derive(Clone, Copy)]
+pub(super) struct D4(__m256d);
+
+impl D4 {
+    /// # Safety
+    ///
+    /// The processor has AVX2.
+    #[inline(always)]
+    pub unsafe fn widened(floats: &[f32; 4]) -> Self {
+        // SAFETY: the caller's promise; the array has four floats.
+        D4(unsafe { _mm256_cvtps_pd(_mm_loadu_ps(floats.as_ptr())) })
+    }
+}
+
+impl Doubles for D4 {
+    pairwise! {
+        add: _mm256_add_pd;
+        sub: _mm256_sub_pd;
+        mul: _mm256_mul_pd;
+        div: _mm256_div_pd;
+    }
+
+    #[inline(always)]
+    fn times(self, factor: f64) -> Self {
+        // SAFETY: a value of this type proves AVX2.
+        D4(unsafe { _mm256_mul_pd(self.0, _mm256_set1_pd(factor)) })
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        // SAFETY: as above.
+        D4(unsafe { _mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0) })
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        // SAFETY: as above.
+        D4(unsafe { _mm256_xor_pd(_mm256_set1_pd(-0.0), self.0) })
+    }
+
+    #[inline(always)]
+    fn less(self, other: Self) -> u32 {
+        // SAFETY: as above.
+        unsafe { _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(self.0, other.0)) as u32 }
+    }
+}
+
+impl Quad for D4 {
+    #[inline(always)]
+    fn turned(self) -> Self {
+        // SAFETY: a value of this type proves AVX2.
+        D4(unsafe { _mm256_permute4x64_pd::<0xC9>(self.0) })
+    }
+
+    #[inline(always)]
+    fn first(self) -> Self {
+        // SAFETY: as above.
+        D4(unsafe { _mm256_broadcastsd_pd(_mm256_castpd256_pd128(self.0)) })
+    }
+
+    #[inline(always)]
+    fn sums([a, b, c, d]: [Self; 4]) -> Self {
+        // SAFETY: as above.
+        unsafe {
+            let [first, second] = [_mm256_unpacklo_pd(a.0, b.0), _mm256_unpackhi_pd(a.0, b.0)];
+            let [third, fourth] = [_mm256_unpacklo_pd(c.0, d.0), _mm256_unpackhi_pd(c.0, d.0)];
+            let x = _mm256_permute2f128_pd::<0x20>(first, third);
+            let y = _mm256_permute2f128_pd::<0x20>(second, fourth);
+            let z = _mm256_permute2f128_pd::<0x31>(first, third);
+            D4(_mm256_add_pd(_mm256_add_pd(x, y), z))
+        }
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f64; 4] {
+        let mut array = [0.0; 4];
+        // SAFETY: as above; the array has four doubles.
+        unsafe { _mm256_storeu_pd(array.as_mut_ptr(), self.0) };
+        array
     }
 }

@@ -1,0 +1,62 @@
+//! A triangle that surely is met, of which the rest can wait.
+
+use super::{Filter, TriangleLane};
+use crate::block::leaf::{Place, TriangleBlock};
+use crate::ray::{Interval, PreparedRay};
+
+/// The triangle that comes first as far as single precision tells: what is answered of it is computed when the search
+/// ends, or when something else is met that may come first.
+///
+/// Most rays that hit anything compute one `t` so, and no node waits for it.
+pub(super) struct Waiting<'m> {
+    blocks: &'m [TriangleBlock],
+    /// The number of its block; [`NOBODY`] if there is none.
+    block: u32,
+    lane: u32,
+    /// What is met before this `t` of the frame comes before all that was met so far.
+    first_before: f32,
+}
+
+const NOBODY: u32 = u32::MAX;
+
+impl<'m> Waiting<'m> {
+    /// Nothing, and nothing ever if the filter asks more of a triangle than that it is met.
+    #[inline(always)]
+    pub fn new(blocks: &'m [TriangleBlock], filter: &Filter, t_max: f32) -> Self {
+        let first_before = if filter.sees_all() { t_max } else { f32::NEG_INFINITY };
+        Waiting { blocks, block: NOBODY, lane: 0, first_before }
+    }
+
+    /// Takes the triangle in this lane, which the ray meets in this part of itself, if it comes first and within the ray's
+    /// limits; whether it does.
+    ///
+    /// Both limits of the frame are less than an ulp outside of the given ones, so what is beyond neither, nor at it, is within those.
+    #[inline(always)]
+    pub fn takes(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
+        let first = ray.t_min < part.near && part.far < self.first_before;
+        if first {
+            *self = Waiting { blocks: self.blocks, block, lane, first_before: part.near };
+        }
+        first
+    }
+
+    /// The one that waits.
+    #[inline(always)]
+    pub fn lane(&self) -> Option<TriangleLane<'m>> {
+        let block = self.blocks.get(self.block as usize)?;
+        let place = Place::of_lane(self.block, block.first, self.lane);
+        Some(TriangleLane { block, place, sure: true, inside: true })
+    }
+
+    /// The same, which waits no longer; nor does any that comes after it.
+    #[inline(always)]
+    pub fn end(&mut self) -> Option<TriangleLane<'m>> {
+        self.first_before = f32::NEG_INFINITY;
+        if self.block == NOBODY {
+            return None;
+        }
+        let lane = self.lane();
+        self.block = NOBODY;
+        lane
+    }
+}
