@@ -245,21 +245,28 @@ wasm() { # Rust target, Rust flags
     same agree.txt "$work/$name.txt"
 }
 
+# module NAME FEATURES: one of the page's modules, beside the page.
+module() {
+    local folder=$work/page
+    CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path ../examples/wasm/Cargo.toml --release \
+        --no-default-features --features "$2" --target "$target" -- -C linker=wasm-ld >&2
+    # Takes off a tenth; what it may use is what every browser has known for years, and the compiler uses.
+    wasm-opt -Oz --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --enable-mutable-globals \
+        --enable-reference-types --enable-multivalue "$folder/$target/release/page.wasm" -o "../examples/wasm/$1.wasm"
+    cost "$1-bytes" "$(wc -c <"../examples/wasm/$1.wasm")"
+}
+
 # The page of examples/wasm, and what it shows.
 page() { # Rust target, -, browser
     install wasm-ld lld
-    local folder=$work/page shot=$work/page.png
-    CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path ../examples/wasm/Cargo.toml --release \
-        --target "$1" -- -C linker=wasm-ld >&2
-    # Takes off a tenth; what it may use is what every browser has known for years, and the compiler uses.
     install wasm-opt binaryen
-    wasm-opt -Oz --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --enable-mutable-globals \
-        --enable-reference-types --enable-multivalue "$folder/$1/release/page.wasm" -o ../examples/wasm/page.wasm
-    cost bytes "$(wc -c <../examples/wasm/page.wasm)"
+    install node nodejs
+    module page trace
+    module build build
+    node ../examples/wasm/bake.js
     [ -z "${PAGE_ONLY:-}" ] || return 0
     install "$3" chromium
-    install node nodejs
-    node page.mjs ../examples/wasm "$3" "$shot"
+    node page.mjs ../examples/wasm "$3" scene.obj "$work/page.png"
 }
 
 write=
