@@ -73,8 +73,9 @@ library() {
 # agree TARGET KIND FLAGS: where the crate `agree` is.
 agree() {
     local folder=$work/agree flags=${3:-}
-    CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path agree/Cargo.toml --release \
-        --target "$1" --crate-type "$2" -- ${flags//,/ } >&2
+    # The flags are for the library as well, not for the last crate alone.
+    RUSTFLAGS=${flags//,/ } CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path agree/Cargo.toml \
+        --release --target "$1" --crate-type "$2" >&2
     echo "$folder/$1/release"
 }
 
