@@ -48,7 +48,7 @@ impl Accel<'_> {
 
     fn write_packed(&self, bytes: &mut [u8]) -> Option<()> {
         let block = self.block();
-        bytes.get_mut(..block.len())?.copy_from_slice(block);
+        copy(block, bytes.get_mut(..block.len())?);
         let Some(level) = self.level().filter(|level| level.is_linked()) else { return Some(()) };
         let own = self.own_size();
         let (instances, count) = (level.instances.len(), level.children.len());
@@ -74,12 +74,19 @@ impl Accel<'_> {
         for place in children {
             let child = level.child_at(*place)?.bytes();
             let (own, rest) = core::mem::take(&mut free).split_at_mut_checked(child.len())?;
-            own.copy_from_slice(child);
+            copy(child, own);
             *place = end as u64;
             end += child.len();
             free = rest;
         }
         head.is_linked = 0;
         seal_packed(bytes, end)
+    }
+}
+
+/// For slices of one length, without a panic for those of two.
+fn copy(from: &[u8], to: &mut [u8]) {
+    for (from, to) in from.iter().zip(to) {
+        *to = *from;
     }
 }

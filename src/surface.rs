@@ -93,6 +93,7 @@ impl Spot {
 
 /// `position + by`, each coordinate rounded away from `position`.
 fn moved(position: [f32; 3], by: DVec3) -> [f32; 3] {
-    let target = wide(position) + by;
-    [0, 1, 2].map(|k| if by[k] > 0.0 { f32_above(target[k]) } else { f32_below(target[k]) })
+    let [x, y, z] = (wide(position) + by).to_array();
+    let away = |target, by| if by > 0.0 { f32_above(target) } else { f32_below(target) };
+    [away(x, by.x), away(y, by.y), away(z, by.z)]
 }

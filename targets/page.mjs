@@ -1,15 +1,17 @@
 // Opens the page of a folder in a browser without a screen, switches between its structures, and checks what it says and shows.
 //
-// page.mjs FOLDER BROWSER SHOT
+// page.mjs FOLDER BROWSER MESH SHOT
 import { spawn } from 'node:child_process';
 import { createServer } from 'node:http';
 import { readFile, writeFile } from 'node:fs/promises';
-import { join, extname } from 'node:path';
+import { join, extname, resolve } from 'node:path';
 
-const [folder, browser, shot] = process.argv.slice(2);
+const [folder, browser, mesh, shot] = process.argv.slice(2);
 const types = { '.html': 'text/html', '.js': 'text/javascript', '.wasm': 'application/wasm' };
 
+const fetched = new Set();
 const server = createServer(async ({ url }, response) => {
+  fetched.add(url);
   try {
     const path = url === '/' ? '/index.html' : url;
     const body = await readFile(join(folder, path));
@@ -49,37 +51,55 @@ function fail(why) {
 const evaluate = async (expression) => (await ask('Runtime.evaluate', { expression })).result.value;
 const wait = (ms) => new Promise((done) => setTimeout(done, ms));
 
-// What the page says once it has shown pictures: what was built, and at what speed it is traced.
-async function said() {
+// What the page says once it has shown pictures of a structure over a scene, as `how` tells: what it is, and at what speed it is traced.
+async function said(structure, how) {
+  let text;
   for (let i = 0; i < 200; i++) {
-    const text = await evaluate(`[...document.querySelectorAll('output')].map((o) => o.value).join('; ')`);
-    const parts = /^([\d,]+) triangles built in \d+ ms, \d+ KiB; ([\d.]+) million pixels a second, ([\d.]+) steps each$/.exec(text);
-    if (parts && parts.slice(2).every((number) => Number(number) > 0)) return text;
+    text = await evaluate(`[...document.querySelectorAll('output')].map((o) => o.value).join('; ')`);
+    const parts = /^([\d,]+) triangles, (.+) of \d+ KiB, (.+); ([\d.]+) million pixels a second, ([\d.]+) steps each$/.exec(text);
+    const [, triangles, name, source, speed, steps] = parts ?? [];
+    if (name === structure && how.test(`${triangles} ${source}`) && Number(speed) > 0 && Number(steps) > 0) return text;
     await wait(100);
   }
-  fail('it shows no picture');
+  fail(`it shows no picture: ${text}`);
 }
 
 const { targetId } = await ask('Target.createTarget', { url: `http://127.0.0.1:${server.address().port}/` });
 ({ sessionId: session } = await ask('Target.attachToTarget', { targetId, flatten: true }));
 const click = (what) => evaluate(`document.querySelector('${what}').click()`);
 const picture = () => evaluate(`document.getElementById('picture').toDataURL()`);
-// Standing still, all structures show the same picture.
-await said();
+
+// Standing still, all structures show the same picture: that of the first one.
+async function samePictures(how) {
+  const pictures = [];
+  for (const [structure, name] of [['nested', 'nested grids'], ['grid', 'one grid'], ['bvh', 'BVH']]) {
+    await click(`[name=structure][value="${structure}"]`);
+    console.log(await said(name, how));
+    pictures.push(await picture());
+  }
+  if (pictures[0].length < 10000 || pictures.some((one) => one !== pictures[0])) fail('pictures differ, or are empty');
+  return pictures[0];
+}
+
+await said('BVH', /^4,802 baked$/);
 await click('#turn');
 await wait(200);
-const pictures = [];
-for (const structure of [1, 2, 0]) {
-  await click(`[name=structure][value="${structure}"]`);
-  await wait(300);
-  console.log(`${structure}: ${await said()}`);
-  pictures.push(await picture());
-}
-if (pictures[0].length < 10000 || pictures.some((one) => one !== pictures[0])) fail('pictures differ, or are empty');
+const first = await samePictures(/^4,802 baked$/);
+if (fetched.has('/build.wasm')) fail('it fetches a builder for what is baked');
 await click('#heat');
 await wait(500);
-if ((await picture()) === pictures[0]) fail('the heat map shows nothing else');
+if ((await picture()) === first) fail('the heat map shows nothing else');
 await writeFile(shot, Buffer.from((await ask('Page.captureScreenshot')).data, 'base64'));
+await click('#heat');
+
+// What is not baked is built: a finer scene, and a mesh of one's own.
+await evaluate(`scene.value = '600x24', scene.dispatchEvent(new Event('change'))`);
+const finer = await samePictures(/^28,802 built in \d+ ms$/);
+if (finer === first) fail('it shows the same scene');
+const { root } = await ask('DOM.getDocument');
+const { nodeId } = await ask('DOM.querySelector', { nodeId: root.nodeId, selector: '#file' });
+await ask('DOM.setFileInputFiles', { nodeId, files: [resolve(mesh)] });
+if ((await samePictures(/^604 built in \d+ ms$/)) === finer) fail('it does not show the mesh');
 clearTimeout(limit);
 child.kill();
 server.close();

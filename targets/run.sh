@@ -57,8 +57,8 @@ cargo_for() {
     fi
 }
 
-# library TARGET FEATURES [PANICS]: where libraykern.a is, with these kinds of blocks. One that can panic does not link, unless
-# PANICS is `freestanding`: it is held to that for microcontrollers.
+# library TARGET FEATURES [PANICS]: where libraykern.a is, with these kinds of blocks. A program that could panic does not link, unless
+# PANICS is `freestanding`: microcontrollers are held to that.
 library() {
     local panics=${3:-panic-free}
     local folder=$work/lib
@@ -73,8 +73,9 @@ library() {
 # agree TARGET KIND FLAGS: where the crate `agree` is.
 agree() {
     local folder=$work/agree flags=${3:-}
-    CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path agree/Cargo.toml --release \
-        --target "$1" --crate-type "$2" -- ${flags//,/ } >&2
+    # The flags are for the library as well, not for the last crate alone.
+    RUSTFLAGS=${flags//,/ } CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path agree/Cargo.toml \
+        --release --target "$1" --crate-type "$2" >&2
     echo "$folder/$1/release"
 }
 
@@ -100,17 +101,35 @@ cost() { # what, number
 
 # size PREFIX ARCHIVE WHAT ENTRY ...: the bytes that a program pays for these entry points, and that no variables are among them.
 size() {
-    local prefix=$1 archive=$2 what=$3 image=$work/size.elf
-    shift 3
-    "${prefix}gcc" "${flags[@]}" -nostdlib -Wl,--gc-sections -Wl,-e,"$1" "${@/#rt_/-Wl,-u,rt_}" "$archive" -lgcc \
-        -o "$image"
-    local text data bss
-    read -r text data bss _ < <("${prefix}size" "$image" | tail -1)
+    local what=$3 text data bss
+    links "$1" "$2" "${@:4}"
+    read -r text data bss _ < <("$1size" "$work/links.elf" | tail -1)
     if [ $((data + bss)) -ne 0 ]; then
         echo "$name: there are variables: $data + $bss bytes" >&2
         return 1
     fi
     cost "flash-$what" "$text"
+}
+
+# cannot_panic PREFIX TARGET: links whatever cannot panic: all entry points, of libraries that build no grids and no bundles; with grids,
+# queries; and sees a program that could.
+cannot_panic() {
+    local all ask=(rt_accel_open rt_intersect rt_occluded rt_intersect_watertight rt_occluded_watertight rt_intersect_with rt_occluded_with)
+    mapfile -t all < <(grep -o 'rt_[a-z_]*(' ../include/raykern.h | tr -d '(' | sort -u)
+    links "$1" "$(library "$2" "")" "${all[@]}"
+    links "$1" "$(library "$2" spheres,instances,refit)" "${all[@]}"
+    links "$1" "$(library "$2" grid)" "${ask[@]}"
+    if links "$1" "$(library "$2" grid)" rt_build_grid 2>/dev/null; then
+        echo "$name: builds of grids cannot panic: hold them to it" >&2
+        return 1
+    fi
+}
+
+# links PREFIX ARCHIVE ENTRY ...: whether these entry points do, with all they call.
+links() {
+    local gcc=$1gcc archive=$2
+    shift 2
+    "$gcc" "${flags[@]}" -nostdlib -Wl,--gc-sections -Wl,-e,"$1" "${@/#rt_/-Wl,-u,rt_}" "$archive" -lgcc -o "$work/links.elf"
 }
 
 # program PREFIX ARCHIVE BOARD NAME: a C program without a C library for a board; where it is.
@@ -146,7 +165,7 @@ board() { # prefix, Rust target, board
     local small kinds printed=$work/$name.txt image
     local part what number archive
     small=$(library "$2" "")
-    kinds=$(library "$2" spheres,instances freestanding)
+    kinds=$(library "$2" spheres,instances)
     for part in picture core kinds; do
         board_memory "$part"
         archive=$small
@@ -158,9 +177,10 @@ board() { # prefix, Rust target, board
             cost "$part-$what" "$number"
         done < <(grep '^#' "$printed")
     done
-    # Queries of these kinds cannot panic either; their builds can. Asked of one board for all.
-    [ "$name" != m4f ] ||
-        size "$1" "$(library "$2" spheres,instances)" kinds rt_accel_open rt_intersect rt_occluded
+    # Asked of one board for all.
+    [ "$name" != m4f ] || cannot_panic "$1" "$2"
+    [ "$name" != m4f ] || size "$1" "$kinds" kinds rt_accel_open rt_intersect rt_occluded
+    [ "$name" != m4f ] || size "$1" "$(library "$2" grid)" grids rt_accel_open rt_intersect rt_occluded
     size "$1" "$small" queries rt_accel_open rt_intersect rt_occluded
     size "$1" "$small" watertight rt_accel_open rt_intersect_watertight rt_occluded_watertight
     size "$1" "$small" choices rt_accel_open rt_intersect_with rt_occluded_with
@@ -245,21 +265,28 @@ wasm() { # Rust target, Rust flags
     same agree.txt "$work/$name.txt"
 }
 
+# module NAME FEATURES: one of the page's modules, beside the page.
+module() {
+    local folder=$work/page
+    CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path ../examples/wasm/Cargo.toml --release \
+        --no-default-features --features "$2" --target "$target" -- -C linker=wasm-ld >&2
+    # Takes off a tenth; what it may use is what every browser has known for years, and the compiler uses.
+    wasm-opt -Oz --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --enable-mutable-globals \
+        --enable-reference-types --enable-multivalue "$folder/$target/release/page.wasm" -o "../examples/wasm/$1.wasm"
+    cost "$1-bytes" "$(wc -c <"../examples/wasm/$1.wasm")"
+}
+
 # The page of examples/wasm, and what it shows.
 page() { # Rust target, -, browser
     install wasm-ld lld
-    local folder=$work/page shot=$work/page.png
-    CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path ../examples/wasm/Cargo.toml --release \
-        --target "$1" -- -C linker=wasm-ld >&2
-    # Takes off a tenth; what it may use is what every browser has known for years, and the compiler uses.
     install wasm-opt binaryen
-    wasm-opt -Oz --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --enable-mutable-globals \
-        --enable-reference-types --enable-multivalue "$folder/$1/release/page.wasm" -o ../examples/wasm/page.wasm
-    cost bytes "$(wc -c <../examples/wasm/page.wasm)"
+    install node nodejs
+    module page trace
+    module build build
+    node ../examples/wasm/bake.js
     [ -z "${PAGE_ONLY:-}" ] || return 0
     install "$3" chromium
-    install node nodejs
-    node page.mjs ../examples/wasm "$3" "$shot"
+    node page.mjs ../examples/wasm "$3" scene.obj "$work/page.png"
 }
 
 write=

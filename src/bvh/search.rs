@@ -32,8 +32,9 @@ pub(crate) fn search(nodes: &[BvhNode], nearest: &mut impl Seek) {
         }
         // What was found meanwhile may be closer than what waits.
         let next = loop {
-            let Some((next, square)) = stack[..count].last().copied() else { return };
-            count -= 1;
+            let Some(last) = count.checked_sub(1) else { return };
+            count = last;
+            let Some((next, square)) = stack.get(last).copied() else { return };
             if nearest.is_within(square) {
                 break next;
             }

@@ -94,7 +94,8 @@ pub(crate) fn from_centre(line: &Line, centre: [f32; 3], radius: f32, root: usiz
     let exponent = 2 * (roots.space + roots.ahead);
     let along = sqrt(roots.discriminant.approximate(exponent));
     let along = if root == 0 { -along } else { along };
-    [0, 1, 2].map(|k| across[k] + along * f64::from(line.direction[k]))
+    let ([x, y, z], [dx, dy, dz]) = (across, line.direction.map(f64::from));
+    [x + along * dx, y + along * dy, z + along * dz]
 }
 
 /// `a v - b d`.
@@ -103,7 +104,9 @@ fn across<N: Number>(units: Units, line: &Line, centre: [f32; 3]) -> [f64; 3] {
     let v = minus(&units.space.count::<N>(line.origin), &units.space.count(centre));
     let (a, b) = (dot(&d, &d), dot(&v, &d));
     let exponent = units.space.exponent + 2 * units.ahead.exponent;
-    [0, 1, 2].map(|k| (a * v[k] - b * d[k]).to_integer::<14>().approximate(exponent))
+    let ([vx, vy, vz], [dx, dy, dz]) = (v, d);
+    [a * vx - b * dx, a * vy - b * dy, a * vz - b * dz]
+        .map(|number| number.to_integer::<14>().approximate(exponent))
 }
 
 /// One of two roots.

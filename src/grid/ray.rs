@@ -38,7 +38,8 @@ impl CellRay {
         let mut turned =
             CellRay { origin: [0.0; 3], direction: [0.0; 3], turned: [0; 3], resolution };
         let per_t = inverse_power_of_two(ray.t_scale);
-        for (k, n) in resolution.into_iter().enumerate() {
+        for k in 0..3 {
+            let n = turned.resolution[k];
             let origin = (f64::from(ray.given.origin[k]) - head.lower[k]) * head.per_length[k];
             let direction = f64::from(ray.given.direction[k]) * (head.per_length[k] * per_t);
             let falls = direction < 0.0;

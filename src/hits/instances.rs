@@ -45,7 +45,7 @@ pub(super) fn fill(
         Some(list.limited(&start).t_max)
     });
     let count = list.count;
-    if let Some(hit) = hits[..count].last() {
+    if let Some(hit) = hits.get(..count).and_then(<[_]>::last) {
         *last = Some(key_of(hit));
     }
     count
@@ -109,7 +109,7 @@ impl List<'_, '_, '_> {
         loop {
             let mut found = [Hit::MISS; FETCH];
             let count = fill_marked(shown, ray, self.options, &mut last, &mut found);
-            for hit in &found[..count] {
+            for hit in found.iter().take(count) {
                 if !self.offer(Hit { instance: shown.instance, ..*hit }) {
                     return;
                 }
@@ -126,7 +126,7 @@ impl List<'_, '_, '_> {
         if self.after.is_some_and(|after| places.order(&key, &after) != Ordering::Greater) {
             return true;
         }
-        let sorted = &self.hits[..self.count];
+        let sorted = self.hits.get(..self.count).unwrap_or(&[]);
         // What is there already belongs to an instance that was come to twice.
         let place = match sorted.binary_search_by(|other| places.order(&key_of(other), &key)) {
             Ok(_) => return true,
@@ -136,8 +136,10 @@ impl List<'_, '_, '_> {
             return false;
         }
         self.count = (self.count + 1).min(self.hits.len());
-        self.hits.copy_within(place..self.count - 1, place + 1);
-        self.hits[place] = hit;
+        let mut moved = hit;
+        for hit in self.hits.iter_mut().take(self.count).skip(place) {
+            core::mem::swap(hit, &mut moved);
+        }
         true
     }
 

@@ -114,7 +114,7 @@ fn fill_marked(
     }
     let choice = shown.choice(options);
     let count = trace::ask(block, &ray, HitsAfter { choice, after, hits });
-    if let Some(hit) = hits[..count].last() {
+    if let Some(hit) = hits.get(..count).and_then(<[_]>::last) {
         *last = Some(key_of(hit));
     }
     count

@@ -49,19 +49,19 @@ impl Map {
             return None;
         }
         let [a, b, c] = rows.map(wide);
-        let columns = [minors(b, c), minors(c, a), minors(a, b)];
-        let world_to_object =
-            [0, 1, 2].map(|i| [0, 1, 2].map(|j: usize| columns[j][i] / determinant));
+        let [x, y, z] = [minors(b, c), minors(c, a), minors(a, b)].map(|p| p / determinant);
+        let world_to_object = [[x.x, y.x, z.x], [x.y, y.y, z.y], [x.z, y.z, z.z]];
         Some(Map { object_to_world, world_to_object })
     }
 
     /// The box around an instance of what is in `aabb`, conservatively, before it is widened.
     pub fn bounds(&self, aabb: &Aabb) -> [DVec3; 2] {
-        let (lower, upper) = (clamped(aabb.lower), clamped(aabb.upper));
+        let (lower, upper) = (clamped(aabb.lower).to_array(), clamped(aabb.upper).to_array());
         let (mut least, mut most) = (self.shift(), self.shift());
         let mut size = self.shift().abs();
-        for (k, column) in self.linear().into_iter().enumerate() {
-            let (p, q) = (column * lower[k], column * upper[k]);
+        for (column, (lower, upper)) in self.linear().into_iter().zip(lower.into_iter().zip(upper))
+        {
+            let (p, q) = (column * lower, column * upper);
             least += p.min(q);
             most += p.max(q);
             size += p.abs().max(q.abs());
@@ -131,8 +131,8 @@ impl Map {
 
     /// The columns of `A`.
     pub fn linear(&self) -> [DVec3; 3] {
-        let m = &self.object_to_world;
-        [0, 1, 2].map(|k| wide([m[k], m[4 + k], m[8 + k]]))
+        let [ax, bx, cx, _, ay, by, cy, _, az, bz, cz, _] = self.object_to_world;
+        [wide([ax, ay, az]), wide([bx, by, bz]), wide([cx, cy, cz])]
     }
 
     /// `b`.
@@ -155,7 +155,8 @@ impl Map {
 }
 
 fn rows(m: &[f32; 12]) -> [[f32; 3]; 3] {
-    [0, 4, 8].map(|i| [m[i], m[i + 1], m[i + 2]])
+    let [ax, bx, cx, _, ay, by, cy, _, az, bz, cz, _] = *m;
+    [[ax, bx, cx], [ay, by, cy], [az, bz, cz]]
 }
 
 /// `a . (b x c)`; zero if that is not finite.

@@ -3,8 +3,9 @@
 use super::boxes::{Placed, Placing};
 use crate::block::level::{InstanceRecord, LevelHead, LevelMut, LevelOffsets};
 use crate::block::seal_level;
-use crate::math::Aabb;
+use crate::math::{Aabb, heap_sort};
 use crate::scene::Boxes;
+use crate::simd::SMALL;
 
 /// The bytes that head, records and children take at most.
 pub(crate) fn fixed_size(instances: usize) -> Option<usize> {
@@ -73,13 +74,21 @@ fn list_children(placed: &Placed, children: &mut [u64]) -> usize {
     for (i, child) in children.iter_mut().enumerate() {
         *child = placed.child(i).map_or(0, |child| child.expose_provenance() as u64);
     }
-    children.sort_unstable();
-    let mut count = 0;
+    if SMALL {
+        heap_sort(children)
+    } else {
+        children.sort_unstable()
+    }
+    let (mut count, mut last) = (0, None);
     for i in 0..children.len() {
-        if count == 0 || children[i] != children[count - 1] {
-            children[count] = children[i];
+        let child = children.get(i).copied();
+        if child != last
+            && let (Some(child), Some(place)) = (child, children.get_mut(count))
+        {
+            *place = child;
             count += 1;
         }
+        last = child;
     }
     count
 }

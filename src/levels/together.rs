@@ -14,7 +14,7 @@ use crate::block::Finished;
 use crate::block::level::InstanceRecord;
 use crate::query::{Choice, Exact, QueryOptions};
 use crate::ray::{Hit, NONE, Ray};
-use crate::simd::{self, Kernel, Simd};
+use crate::simd::{self, Kernel, SMALL, Simd};
 use crate::trace::{AnyHit, ClosestHit, Together};
 
 /// So few rays are asked for one by one.
@@ -126,7 +126,9 @@ fn of_each<A: Asked>(
     answers: &mut [A::Answer],
 ) {
     let Some(level) = &block.level() else { return };
-    let (chunk, flies) = (Chunk(World { block, level, options }), simd::dispatch(Flies));
+    let chunk = Chunk(World { block, level, options });
+    // What cannot be is not linked.
+    let flies = !SMALL && simd::dispatch(Flies);
     let cached = are_small(level);
     for (rays, answers) in rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)) {
         if flies && !(cached && are_unlike(rays)) {

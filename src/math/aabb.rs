@@ -44,10 +44,12 @@ impl Aabb {
 
     /// The point of the box that is nearest to `point` along each axis; `lower` where that is NaN.
     pub fn nearest(&self, point: [f32; 3]) -> [f32; 3] {
-        core::array::from_fn(|k| {
+        let mut nearest = self.lower;
+        for k in 0..3 {
             let above = if point[k] > self.lower[k] { point[k] } else { self.lower[k] };
-            if above < self.upper[k] { above } else { self.upper[k] }
-        })
+            nearest[k] = if above < self.upper[k] { above } else { self.upper[k] };
+        }
+        nearest
     }
 
     /// The largest coordinate in size; 0 for the empty box.

@@ -9,8 +9,10 @@ pub(crate) mod fixed;
 pub(crate) mod float;
 pub(crate) mod integer;
 pub(crate) mod rounding;
+mod sort;
 pub(crate) mod wide;
 
 pub(crate) use aabb::Aabb;
 pub(crate) use bits::Bits;
+pub(crate) use sort::heap_sort;
 pub(crate) use wide::{sum_abs, wide};

@@ -21,30 +21,37 @@ impl Frame {
     /// Of the matrix with these columns.
     pub fn of(columns: [DVec3; 3]) -> Frame {
         // One-sided: columns are turned until they are at right angles, and then are as long as the roots of the values.
-        let (mut b, mut axes) = (columns, [DVec3::X, DVec3::Y, DVec3::Z]);
+        let [x, y, z] = columns;
+        let (mut x, mut y, mut z) = ([x, DVec3::X], [y, DVec3::Y], [z, DVec3::Z]);
         for _ in 0..SWEEPS {
-            for (i, j) in [(0, 1), (0, 2), (1, 2)] {
-                let (along, across) =
-                    (b[i].dot(b[j]), b[j].length_squared() - b[i].length_squared());
-                if along == 0.0 {
-                    continue;
-                }
-                let slope = across / (2.0 * along);
-                let tangent = 1f64.copysign(slope) / (slope.abs() + sqrt(1.0 + slope * slope));
-                let cosine = 1.0 / sqrt(1.0 + tangent * tangent);
-                let sine = cosine * tangent;
-                for v in [&mut b, &mut axes] {
-                    (v[i], v[j]) = (cosine * v[i] - sine * v[j], sine * v[i] + cosine * v[j]);
-                }
-            }
+            turn(&mut x, &mut y);
+            turn(&mut x, &mut z);
+            turn(&mut y, &mut z);
         }
-        Frame { values: b.map(|column| column.length_squared()), axes }
+        let ([x, first], [y, second], [z, third]) = (x, y, z);
+        let values = [x, y, z].map(DVec3::length_squared);
+        Frame { values, axes: [first, second, third] }
     }
 
     /// The root of the largest value: how far the matrix stretches at most.
     pub fn largest(&self) -> f64 {
         let [x, y, z] = self.values;
         sqrt(x.max(y).max(z))
+    }
+}
+
+/// Turns two columns, and the axes that they began at, until the columns are at right angles.
+fn turn(p: &mut [DVec3; 2], q: &mut [DVec3; 2]) {
+    let (along, across) = (p[0].dot(q[0]), q[0].length_squared() - p[0].length_squared());
+    if along == 0.0 {
+        return;
+    }
+    let slope = across / (2.0 * along);
+    let tangent = 1f64.copysign(slope) / (slope.abs() + sqrt(1.0 + slope * slope));
+    let cosine = 1.0 / sqrt(1.0 + tangent * tangent);
+    let sine = cosine * tangent;
+    for (p, q) in p.iter_mut().zip(q) {
+        (*p, *q) = (cosine * *p - sine * *q, sine * *p + cosine * *q);
     }
 }
 

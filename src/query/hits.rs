@@ -80,8 +80,10 @@ impl<'m, 'h> NextHits<'m, 'h> {
     /// Writes over each kept meeting what `record` makes of it; returns how many they are.
     pub fn finish(&mut self, ray: &PreparedRay, record: impl Fn(&ExactMet) -> Hit) -> usize {
         for i in 0..self.count {
-            let met = self.meet_again(ray, &self.kept[i]);
-            self.kept[i] = met.as_ref().map_or(Hit::MISS, &record);
+            let met = self.kept.get(i).and_then(|kept| self.meet_again(ray, kept));
+            if let Some(kept) = self.kept.get_mut(i) {
+                *kept = met.as_ref().map_or(Hit::MISS, &record);
+            }
         }
         self.count
     }
@@ -95,7 +97,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
         if self.after.as_ref().is_some_and(|after| order(after) != Ordering::Greater) {
             return;
         }
-        let kept = &self.kept[..self.count];
+        let kept = self.kept.get(..self.count).unwrap_or(&[]);
         let place = match kept.last() {
             None => 0,
             // Near ones are mostly offered first.
@@ -113,8 +115,10 @@ impl<'m, 'h> NextHits<'m, 'h> {
         let capacity = self.kept.len();
         if place < capacity {
             self.count = (self.count + 1).min(capacity);
-            self.kept.copy_within(place..self.count - 1, place + 1);
-            self.kept[place] = new;
+            let mut moved = new;
+            for kept in self.kept.iter_mut().take(self.count).skip(place) {
+                core::mem::swap(kept, &mut moved);
+            }
         }
         if self.count == capacity
             && let Some(last) = self.kept.last()

@@ -1,4 +1,4 @@
-// A trefoil knot over a floor, as an indexed mesh.
+// What the page shows, as indexed meshes.
 
 // A point of the knot's middle line.
 function middle(u) {
@@ -34,4 +34,30 @@ export function knot(along, around) {
   for (const [x, z] of [[-3, -3], [3, -3], [3, 3], [-3, 3]]) vertices.push(x, -0.7, z);
   indices.push(first, first + 1, first + 2, first, first + 2, first + 3);
   return { vertices: new Float32Array(vertices), indices: new Uint32Array(indices) };
+}
+
+// The scene whose blocks are baked.
+export const baked = () => knot(200, 12);
+
+// The triangles of a file of Wavefront's, moved and scaled to where the knot is.
+export function obj(text) {
+  const vertices = [], indices = [];
+  for (const line of text.split('\n')) {
+    const [what, ...words] = line.trim().split(/\s+/);
+    if (what === 'v') vertices.push(...words.slice(0, 3).map(Number));
+    if (what !== 'f') continue;
+    const corners = words.map((word) => parseInt(word)).map((n) => (n < 0 ? vertices.length / 3 + n : n - 1));
+    for (let i = 2; i < corners.length; i++) indices.push(corners[0], corners[i - 1], corners[i]);
+  }
+  const extents = [0, 1, 2].map((k) => {
+    let [lower, upper] = [Infinity, -Infinity];
+    for (let i = k; i < vertices.length; i += 3) {
+      lower = Math.min(lower, vertices[i]);
+      upper = Math.max(upper, vertices[i]);
+    }
+    return [lower, upper];
+  });
+  const scale = 2.6 / Math.max(...extents.map(([lower, upper]) => upper - lower));
+  const fitted = vertices.map((x, i) => scale * (x - (extents[i % 3][0] + extents[i % 3][1]) / 2));
+  return { vertices: new Float32Array(fitted), indices: new Uint32Array(indices) };
 }
