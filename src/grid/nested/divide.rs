@@ -6,8 +6,8 @@ use super::growing::Growing;
 use super::lists::{Record, Waiting};
 use super::{TRIES, WORK};
 use crate::block::cells::{box_word, cell_count, grid_word, resolution_word};
+use crate::grid::near::Near;
 use crate::grid::options::GridOptions;
-use crate::grid::overlap::cells_near;
 use crate::grid::space::Space;
 use crate::prim::Source;
 
@@ -120,12 +120,14 @@ impl Divider<'_, '_, '_> {
         counts.fill(0);
         pairs.clear();
         let (mut work, mut full) = (0, false);
-        let mut shapes = self.source.shapes();
-        for id in ids {
-            let Some(shape) = shapes.get(*id) else { continue };
-            work += cells_near(space, &shape, |number| {
+        let (mut shapes, mut near) = (self.source.shapes(), Near::new(space));
+        for ids in ids.chunks(16) {
+            for id in ids {
+                shapes.get(*id).map(|shape| near.push(*id, &shape));
+            }
+            work += near.take(|number, id| {
                 counts[number] += 1;
-                full |= pairs.push([number as u32, *id]).is_none();
+                full |= pairs.push([number as u32, id]).is_none();
             });
             if full || pairs.len() as u64 > left {
                 return Counted::NoRoom;

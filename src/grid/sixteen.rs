@@ -1,0 +1,76 @@
+//! Primitives in sixteen lanes, to be looked at side by side.
+
+use crate::math::Aabb;
+use crate::prim::Shape;
+use crate::simd::{Lanes, Simd, Width};
+
+/// Up to sixteen primitives, their corners side by side.
+///
+/// ```text
+/// corners[corner][axis]   | lane 0 | lane 1 | ..
+/// ```
+///
+/// What is no triangle has three corners around which its box is.
+pub(super) struct Sixteen {
+    pub corners: [[[f32; 16]; 3]; 3],
+    pub ids: [u32; 16],
+    pub count: usize,
+    /// The lanes that are triangles.
+    pub triangles: u32,
+}
+
+impl Sixteen {
+    pub const EMPTY: Self =
+        Sixteen { corners: [[[0.0; 16]; 3]; 3], ids: [0; 16], count: 0, triangles: 0 };
+
+    /// Adds a primitive; whether that was the last for which there is room.
+    #[inline(always)]
+    pub fn push(&mut self, id: u32, shape: &Shape) -> bool {
+        let lane = self.count % 16;
+        let corners = match *shape {
+            Shape::Triangle(corners) => corners,
+            Shape::Sphere { .. } | Shape::Box(_) => {
+                let aabb = shape.aabb();
+                [aabb.lower, aabb.upper, aabb.upper]
+            }
+        };
+        for (corner, p) in self.corners.iter_mut().zip(corners) {
+            for (axis, x) in corner.iter_mut().zip(p) {
+                axis[lane] = x;
+            }
+        }
+        self.ids[lane] = id;
+        self.triangles |= u32::from(matches!(shape, Shape::Triangle(_))) << lane;
+        self.count += 1;
+        self.count == 16
+    }
+
+    pub fn clear(&mut self) {
+        (self.count, self.triangles) = (0, 0);
+    }
+
+    /// The primitive in a lane, or what stands for it.
+    pub fn shape(&self, lane: usize) -> Shape {
+        let [a, b, c] = self.corners.map(|corner| corner.map(|axis| axis[lane % 16]));
+        let is_triangle = self.triangles >> lane & 1 == 1;
+        if is_triangle {
+            Shape::Triangle([a, b, c])
+        } else {
+            Shape::Box(Aabb { lower: a, upper: b })
+        }
+    }
+
+    /// The coordinates of all three corners along an axis.
+    #[inline(always)]
+    pub fn along<S: Simd>(&self, s: S, axis: usize) -> [<S as Width<16>>::V; 3] {
+        let [a, b, c] = &self.corners;
+        let (a, b, c) = (&a[axis % 3], &b[axis % 3], &c[axis % 3]);
+        [Width::<16>::load(s, a), Width::<16>::load(s, b), Width::<16>::load(s, c)]
+    }
+}
+
+/// The least and the largest of three.
+#[inline(always)]
+pub(super) fn ends<V: Lanes<16>>([a, b, c]: [V; 3]) -> [V; 2] {
+    [a.min(b).min(c), a.max(b).max(c)]
+}
