@@ -29,6 +29,12 @@ impl<'g> Near<'g> {
         self.waiting.push(id, shape)
     }
 
+    /// The same of a triangle.
+    #[inline(always)]
+    pub fn push_triangle(&mut self, id: u32, corners: [[f32; 3]; 3]) -> bool {
+        self.waiting.push_triangle(id, corners)
+    }
+
     /// Calls `f` with the numbers of each cell and primitive that come near each other, of those that were added, in the order in which they were; returns
     /// how many cells were looked at, or how many are near.
     #[inline(always)]

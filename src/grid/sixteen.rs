@@ -26,21 +26,31 @@ impl Sixteen {
     /// Adds a primitive; whether that was the last for which there is room.
     #[inline(always)]
     pub fn push(&mut self, id: u32, shape: &Shape) -> bool {
-        let lane = self.count % 16;
-        let corners = match *shape {
-            Shape::Triangle(corners) => corners,
+        match *shape {
+            Shape::Triangle(corners) => self.push_triangle(id, corners),
             Shape::Sphere { .. } | Shape::Box(_) => {
                 let aabb = shape.aabb();
-                [aabb.lower, aabb.upper, aabb.upper]
+                self.put(id, [aabb.lower, aabb.upper, aabb.upper])
             }
-        };
+        }
+    }
+
+    /// The same of a triangle.
+    #[inline(always)]
+    pub fn push_triangle(&mut self, id: u32, corners: [[f32; 3]; 3]) -> bool {
+        self.triangles |= 1 << (self.count % 16);
+        self.put(id, corners)
+    }
+
+    #[inline(always)]
+    fn put(&mut self, id: u32, corners: [[f32; 3]; 3]) -> bool {
+        let lane = self.count % 16;
         for (corner, p) in self.corners.iter_mut().zip(corners) {
             for (axis, x) in corner.iter_mut().zip(p) {
                 axis[lane] = x;
             }
         }
         self.ids[lane] = id;
-        self.triangles |= u32::from(matches!(shape, Shape::Triangle(_))) << lane;
         self.count += 1;
         self.count == 16
     }

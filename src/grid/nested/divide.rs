@@ -123,7 +123,10 @@ impl Divider<'_, '_, '_> {
         let (mut shapes, mut near) = (self.source.shapes(), Near::new(space));
         for ids in ids.chunks(16) {
             for id in ids {
-                shapes.get(*id).map(|shape| near.push(*id, &shape));
+                match shapes.corners(*id) {
+                    Some(corners) => near.push_triangle(*id, corners),
+                    None => shapes.get(*id).is_some_and(|shape| near.push(*id, &shape)),
+                };
             }
             work += near.take(|number, id| {
                 counts[number] += 1;

@@ -200,16 +200,10 @@ impl<F: FnMut(usize, Run)> Entries<'_, F> {
 impl<V: Lanes<16>> Reach<V> {
     #[inline(always)]
     fn loaded<S: Simd + Width<16, V = V>>(s: S, ends: &[[[f32; 16]; 3]; 2], lanes: u32) -> Self {
-        let mut reach = Reach {
-            first: [Width::<16>::splat(s, 0.0); 3],
-            last: [Width::<16>::splat(s, 0.0); 3],
-            lanes,
-        };
-        for k in 0..3 {
-            reach.first[k] = Width::<16>::load(s, &ends[0][k]);
-            reach.last[k] = Width::<16>::load(s, &ends[1][k]);
-        }
-        reach
+        let [[a, b, c], [d, e, f]] = ends;
+        let first = [Width::<16>::load(s, a), Width::<16>::load(s, b), Width::<16>::load(s, c)];
+        let last = [Width::<16>::load(s, d), Width::<16>::load(s, e), Width::<16>::load(s, f)];
+        Reach { first, last, lanes }
     }
 
     #[inline(always)]
@@ -241,15 +235,15 @@ impl<V: Lanes<16>> Reach<V> {
 /// The cells around a block of spheres, and the first and the last of each along each axis.
 fn of_spheres(cells: &Narrow, block: &SphereBlock) -> (Cells, [[[f32; 16]; 3]; 2]) {
     let mut all = Cells { first: [u32::MAX; 3], last: [0; 3] };
-    let mut ends = [[[0.0; 16]; 3]; 2];
+    let (mut firsts, mut lasts) = ([[0.0; 16]; 3], [[0.0; 16]; 3]);
     for lane in 0..(block.count as usize).min(SPHERES) {
         let (centre, radius) = block.sphere(lane);
         let Cells { first, last } = cells.range_of(&Shape::Sphere { centre, radius }.aabb());
         for k in 0..3 {
             all.first[k] = all.first[k].min(first[k]);
             all.last[k] = all.last[k].max(last[k]);
-            (ends[0][k][lane], ends[1][k][lane]) = (first[k] as f32, last[k] as f32);
+            (firsts[k][lane], lasts[k][lane]) = (first[k] as f32, last[k] as f32);
         }
     }
-    (all, ends)
+    (all, [firsts, lasts])
 }

@@ -106,10 +106,10 @@ impl Kernel for Middles<'_> {
     fn run<S: Simd>(self, s: S) -> [[f32; 16]; 3] {
         let half = Width::<16>::splat(s, 0.5);
         let mut cells = [[0.0; 16]; 3];
-        for k in 0..3 {
+        for (k, cells) in cells.iter_mut().enumerate() {
             let axis: Axis<_> = self.cells.axis::<S, 16>(s, k);
             let [least, largest] = ends(self.sixteen.along(s, k));
-            axis.cell(axis.at(least.mul(half).add(largest.mul(half)))).store(&mut cells[k]);
+            axis.cell(axis.at(least.mul(half).add(largest.mul(half)))).store(cells);
         }
         cells
     }
