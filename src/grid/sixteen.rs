@@ -1,8 +1,10 @@
 //! Primitives in sixteen lanes, to be looked at side by side.
 
 use crate::math::Aabb;
-use crate::prim::Shape;
+use crate::prim::{Names, Shape, Visitor, visit};
+use crate::scene::Scene;
 use crate::simd::{Lanes, Simd, Width};
+use core::ops::Range;
 
 /// Up to sixteen primitives, their corners side by side.
 ///
@@ -83,4 +85,50 @@ impl Sixteen {
 #[inline(always)]
 pub(super) fn ends<V: Lanes<16>>([a, b, c]: [V; 3]) -> [V; 2] {
     [a.min(b).min(c), a.max(b).max(c)]
+}
+
+/// Calls `f` with the primitives in `range` that can be hit, sixteen at a time and in order; with `sound`, all of them can.
+#[inline]
+pub(super) fn for_each_sixteen(
+    scene: &Scene,
+    range: Range<usize>,
+    sound: bool,
+    f: impl FnMut(&Sixteen),
+) {
+    let mut gathering = Gathering { sound, sixteen: Sixteen::EMPTY, f };
+    visit(scene, range.start as u32..range.end as u32, &mut gathering);
+    (gathering.f)(&gathering.sixteen);
+}
+
+/// Gathers primitives for a function.
+struct Gathering<F> {
+    sound: bool,
+    sixteen: Sixteen,
+    f: F,
+}
+
+impl<F: FnMut(&Sixteen)> Gathering<F> {
+    #[inline(always)]
+    fn show(&mut self) {
+        (self.f)(&self.sixteen);
+        self.sixteen.clear();
+    }
+}
+
+impl<F: FnMut(&Sixteen)> Visitor for Gathering<F> {
+    #[inline(always)]
+    fn triangle(&mut self, id: u32, corners: Option<[[f32; 3]; 3]>, _names: Names) {
+        let is_sound = |corners| self.sound || Shape::Triangle(corners).sound().is_some();
+        let corners = corners.filter(|corners| is_sound(*corners));
+        if corners.is_some_and(|corners| self.sixteen.push_triangle(id, corners)) {
+            self.show();
+        }
+    }
+
+    #[inline(always)]
+    fn other(&mut self, id: u32, shape: Shape) {
+        if shape.sound().is_some_and(|shape| self.sixteen.push(id, &shape)) {
+            self.show();
+        }
+    }
 }

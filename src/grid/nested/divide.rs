@@ -27,6 +27,8 @@ pub(super) struct Divider<'s, 'a, 'p> {
     /// How many numbers cells may list, and how many they do, waiting ones too.
     pub most: u64,
     pub total: u64,
+    /// The most that they did, or would have if a grid that was tried had been worth it.
+    pub peak: u64,
     /// Into how many parts at most an outermost cell is divided along an axis.
     pub finest: f64,
 }
@@ -104,6 +106,10 @@ impl Divider<'_, '_, '_> {
         let Some(first) = self.growing.words.grow(1 + cells) else { return Counted::NoRoom };
         self.growing.words.from(first)[0] = resolution_word(space.resolution);
         let counted = self.count_refs(cell, space, first + 1);
+        if counted == Counted::WorthIt {
+            let would = self.total + self.growing.pairs.len() as u64 - u64::from(cell.count);
+            self.peak = self.peak.max(would);
+        }
         let counts = &self.growing.words.from(first)[1..];
         if counted == Counted::WorthIt && !cost::is_worth_it(cell.count, counts) {
             return Counted::NotWorthIt;

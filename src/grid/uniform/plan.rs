@@ -10,10 +10,10 @@ use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::grid::narrow::{Axis, Narrow};
 use crate::grid::options::GridOptions;
-use crate::grid::sixteen::{Sixteen, ends};
+use crate::grid::sixteen::{Sixteen, ends, for_each_sixteen};
 use crate::grid::space::{Space, cubes, proportions};
 use crate::math::float::cube_root;
-use crate::prim::{GRAIN, Survey, for_each_prim_in};
+use crate::prim::{GRAIN, Survey};
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
 
@@ -127,13 +127,11 @@ fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) ->
     let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
     let narrow = Narrow::new(space);
     let in_part = |ids: Range<usize>| {
-        let (mut sum, mut sixteen) = (0u64, Sixteen::EMPTY);
-        for_each_prim_in(scene, ids.start as u32..ids.end as u32, sound, |prim| {
-            if sixteen.push(prim.id, &prim.shape) {
-                sum = sum.saturating_add(take(&narrow, &mut sixteen));
-            }
+        let mut sum = 0u64;
+        for_each_sixteen(scene, ids, sound, |sixteen| {
+            sum = sum.saturating_add(cells_of(&narrow, sixteen));
         });
-        sum.saturating_add(take(&narrow, &mut sixteen))
+        sum
     };
     let mut all = 0u64;
     caller.for_parts(limit, caller.part_size(limit, GRAIN), in_part, |sum| {
@@ -142,21 +140,19 @@ fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) ->
     all
 }
 
-/// The cells that primitives reach, which make room for others.
-fn take(narrow: &Narrow, sixteen: &mut Sixteen) -> u64 {
-    let counts = dispatch(Counts16 { narrow, sixteen });
-    let count = sixteen.count.min(16);
-    sixteen.clear();
-    counts[..count].iter().map(|count| *count as u64).sum()
+/// How many cells primitives reach.
+fn cells_of(narrow: &Narrow, sixteen: &Sixteen) -> u64 {
+    let counts = dispatch(CellCounts { narrow, sixteen });
+    counts[..sixteen.count.min(16)].iter().map(|count| *count as u64).sum()
 }
 
 /// Counts the cells that each of sixteen primitives reaches, or a few more.
-struct Counts16<'a> {
+struct CellCounts<'a> {
     narrow: &'a Narrow,
     sixteen: &'a Sixteen,
 }
 
-impl Kernel for Counts16<'_> {
+impl Kernel for CellCounts<'_> {
     type Output = [f32; 16];
 
     #[inline(always)]

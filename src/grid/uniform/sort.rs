@@ -4,8 +4,8 @@ use crate::block::Census;
 use crate::caller::{Caller, PARTS};
 use crate::grid::list::{List, front};
 use crate::grid::narrow::{Axis, Narrow};
-use crate::grid::sixteen::{Sixteen, ends};
-use crate::prim::{GRAIN, for_each_prim_in};
+use crate::grid::sixteen::{Sixteen, ends, for_each_sixteen};
+use crate::prim::GRAIN;
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
 use crate::storage::view_mut;
@@ -69,24 +69,18 @@ impl Sorter<'_> {
     }
 
     fn find_cells_of(&self, ids: Range<usize>, pairs: &mut Pairs) -> Option<()> {
-        let (range, sound) = (ids.start as u32..ids.end as u32, self.census.ignored_count == 0);
-        let (mut full, mut sixteen) = (false, Sixteen::EMPTY);
-        for_each_prim_in(self.scene, range, sound, |prim| {
-            if sixteen.push(prim.id, &prim.shape) {
-                full |= self.take(&mut sixteen, pairs).is_none();
-            }
+        let (sound, mut done) = (self.census.ignored_count == 0, Some(()));
+        for_each_sixteen(self.scene, ids, sound, |sixteen| {
+            done = done.and_then(|()| self.write(sixteen, pairs));
         });
-        full |= self.take(&mut sixteen, pairs).is_none();
-        (!full).then_some(())
+        done
     }
 
-    /// Writes down the cells of primitives, which make room for others.
-    fn take(&self, sixteen: &mut Sixteen, pairs: &mut Pairs) -> Option<()> {
+    /// Writes down the cells of primitives.
+    fn write(&self, sixteen: &Sixteen, pairs: &mut Pairs) -> Option<()> {
         let [x, y, z] = dispatch(Middles { cells: self.cells, sixteen });
         let [nx, ny, _] = self.cells.resolution;
-        let count = sixteen.count.min(16);
-        sixteen.clear();
-        (0..count).try_for_each(|lane| {
+        (0..sixteen.count.min(16)).try_for_each(|lane| {
             let [x, y, z] = [x[lane] as u32, y[lane] as u32, z[lane] as u32];
             pairs.push([x + nx * (y + ny * z), sixteen.ids[lane]])
         })
