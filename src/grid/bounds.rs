@@ -7,6 +7,8 @@ use raykern_harness::make::Random;
 use raykern_harness::oracle::dyadic::Dyadic;
 use raykern_harness::search::{Worst, samples};
 
+use super::narrow::Narrow;
+use super::near::Near;
 use super::overlap::cells_near;
 use super::ray::CellRay;
 use super::space::Space;
@@ -229,7 +231,7 @@ fn insertion() {
     const SEED: u64 = 43;
     println!("seed {SEED}");
     let mut random = Random::new(SEED);
-    let (mut points, mut left_out) = (0, 0);
+    let (mut points, mut left_out, mut left_out_small) = (0, 0, 0);
     for _ in 0..samples(3_000) {
         let aabb = bounds(&mut random);
         let n = [0; 3].map(|_| 1 + random.below(40) as u32);
@@ -238,10 +240,31 @@ fn insertion() {
             let cell = space.resolution.map(|n| random.below(n as usize) as u32);
             space = space.within(space.place_of(cell), [0; 3].map(|_| 1 + random.below(9) as u32));
         }
-        let corners = [(); 3].map(|()| point_in(&mut random, &aabb));
+        let mut corners = [(); 3].map(|()| point_in(&mut random, &aabb));
+        let is_small = random.below(4) > 0;
+        if is_small {
+            let per_length = space.lines().1;
+            for (corner, k) in [(1, 0), (1, 1), (1, 2), (2, 0), (2, 1), (2, 2)] {
+                let away = (1.8 * random.unit() - 0.9) / per_length[k];
+                corners[corner][k] = (f64::from(corners[0][k]) + away) as f32;
+            }
+        }
+        let shape = Shape::Triangle(corners);
         let mut listed = Vec::new();
-        let looked_at = cells_near(&space, &Shape::Triangle(corners), |cell| listed.push(cell));
+        let looked_at = cells_near(&space, &shape, |cell| listed.push(cell));
         left_out += looked_at - listed.len() as u64;
+        let (mut near, mut abreast) = (Near::new(&space), Vec::new());
+        near.push(0, &shape);
+        near.take(|cell, _| abreast.push(cell));
+        let (range, wide) =
+            (Narrow::new(&space).range_of(&shape.aabb()), space.range_of(&shape.aabb()));
+        left_out_small += u64::from(is_small) * (range.cell_count() - abreast.len() as u64);
+        for k in 0..3 {
+            assert!(
+                range.first[k] <= wide.first[k] && range.last[k] >= wide.last[k],
+                "{space:?} {corners:?}"
+            );
+        }
         let at = corners.map(|corner| space.point(corner));
         for _ in 0..8 {
             let (a, b) = (random.unit(), random.unit());
@@ -259,11 +282,14 @@ fn insertion() {
                     ((point[k] + off) as u32).min(space.resolution[k] - 1)
                 });
                 points += 1;
-                assert!(listed.contains(&space.number(cell)), "{space:?} {corners:?} {cell:?}");
+                let number = space.number(cell);
+                let both = listed.contains(&number) && abreast.contains(&number);
+                assert!(both, "{space:?} {corners:?} {cell:?}");
             }
         }
     }
     assert!(points > 10_000 && left_out > 10_000, "{points} {left_out}");
+    assert!(left_out_small > 300, "{left_out_small}");
 }
 
 /// All that a block can hold lies inside the walls by more than rounding the times of entry and exit can take.

@@ -7,11 +7,14 @@
 #[cfg(test)]
 mod bounds;
 mod list;
+mod narrow;
+mod near;
 mod nested;
 mod options;
 mod overlap;
 mod ray;
 mod search;
+mod sixteen;
 mod space;
 mod steps;
 mod uniform;

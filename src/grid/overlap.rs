@@ -23,7 +23,7 @@ pub(super) struct Overlap {
 const MOST: f64 = (1u64 << 30) as f64;
 
 /// The axes onto which is projected, for each axis along which is.
-const ACROSS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+pub(super) const ACROSS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 impl Overlap {
     /// The triangle with these corners in cells; `None` when that is too large to tell.

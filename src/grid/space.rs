@@ -156,6 +156,13 @@ impl Space {
         [0, 1, 2].map(|k| 1.0 / (self.per_length[k] * cell.scale[k]))
     }
 
+    /// Its lower corner, and its cells per length.
+    pub fn lines(&self) -> ([f64; 3], [f64; 3]) {
+        let Place { corner, scale } = self.place;
+        let lower = [0, 1, 2].map(|k| self.lower[k] + corner[k] / self.per_length[k]);
+        (lower, [0, 1, 2].map(|k| self.per_length[k] * scale[k]))
+    }
+
     /// What a block keeps of it, if it is an outermost grid.
     pub fn head(&self, first_word: u32, finest: u32) -> GridHead {
         let Space { lower, per_length, bounds, .. } = *self;
@@ -178,11 +185,6 @@ impl Space {
     #[inline(always)]
     fn cell_at(&self, k: usize, x: f64) -> u32 {
         (x as u32).min(self.resolution[k] - 1)
-    }
-
-    /// The cell that holds a point, or the nearest one.
-    pub fn cell_of(&self, p: [f64; 3]) -> [u32; 3] {
-        [0, 1, 2].map(|k| self.cell_at(k, p[k]))
     }
 
     /// The cells that a box in cells, dilated, reaches, or the nearest ones.

@@ -6,8 +6,8 @@ use super::growing::Growing;
 use super::lists::{Record, Waiting};
 use super::{TRIES, WORK};
 use crate::block::cells::{box_word, cell_count, grid_word, resolution_word};
+use crate::grid::near::Near;
 use crate::grid::options::GridOptions;
-use crate::grid::overlap::cells_near;
 use crate::grid::space::Space;
 use crate::prim::Source;
 
@@ -27,6 +27,8 @@ pub(super) struct Divider<'s, 'a, 'p> {
     /// How many numbers cells may list, and how many they do, waiting ones too.
     pub most: u64,
     pub total: u64,
+    /// The most that they did, or would have if a grid that was tried had been worth it.
+    pub peak: u64,
     /// Into how many parts at most an outermost cell is divided along an axis.
     pub finest: f64,
 }
@@ -104,6 +106,10 @@ impl Divider<'_, '_, '_> {
         let Some(first) = self.growing.words.grow(1 + cells) else { return Counted::NoRoom };
         self.growing.words.from(first)[0] = resolution_word(space.resolution);
         let counted = self.count_refs(cell, space, first + 1);
+        if counted == Counted::WorthIt {
+            let would = self.total + self.growing.pairs.len() as u64 - u64::from(cell.count);
+            self.peak = self.peak.max(would);
+        }
         let counts = &self.growing.words.from(first)[1..];
         if counted == Counted::WorthIt && !cost::is_worth_it(cell.count, counts) {
             return Counted::NotWorthIt;
@@ -120,12 +126,17 @@ impl Divider<'_, '_, '_> {
         counts.fill(0);
         pairs.clear();
         let (mut work, mut full) = (0, false);
-        let mut shapes = self.source.shapes();
-        for id in ids {
-            let Some(shape) = shapes.get(*id) else { continue };
-            work += cells_near(space, &shape, |number| {
+        let (mut shapes, mut near) = (self.source.shapes(), Near::new(space));
+        for ids in ids.chunks(16) {
+            for id in ids {
+                match shapes.corners(*id) {
+                    Some(corners) => near.push_triangle(*id, corners),
+                    None => shapes.get(*id).is_some_and(|shape| near.push(*id, &shape)),
+                };
+            }
+            work += near.take(|number, id| {
                 counts[number] += 1;
-                full |= pairs.push([number as u32, *id]).is_none();
+                full |= pairs.push([number as u32, id]).is_none();
             });
             if full || pairs.len() as u64 > left {
                 return Counted::NoRoom;

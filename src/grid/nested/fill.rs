@@ -6,7 +6,7 @@ use crate::block::cells::{CellBox, EMPTY, box_word};
 use crate::grid::list::List;
 use crate::grid::space::Space;
 use crate::math::Aabb;
-use crate::prim::Shapes;
+use crate::prim::{Shapes, box_around};
 use core::ops::Range;
 
 /// Where the next number of a cell's list goes: in the list that waits, or nowhere, as there is none.
@@ -96,8 +96,11 @@ pub(super) fn list_cell(listed: &mut List<u32>, cell_box: CellBox, ids: &[u32]) 
 /// The box of a cell's primitives, as far as it is in the cell and wider by what a walk may be off.
 pub(super) fn box_in(space: &Space, cell: [u32; 3], shapes: &mut Shapes, ids: &[u32]) -> CellBox {
     let mut aabb = Aabb::EMPTY;
-    for shape in ids.iter().filter_map(|id| shapes.get(*id)) {
-        aabb.add(&shape.aabb());
+    for id in ids {
+        match shapes.corners(*id) {
+            Some(corners) => aabb.add(&box_around(corners)),
+            None => drop(shapes.get(*id).map(|shape| aabb.add(&shape.aabb()))),
+        }
     }
     let (mut lower, mut upper) = (space.point(aabb.lower), space.point(aabb.upper));
     for k in 0..3 {

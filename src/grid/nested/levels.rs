@@ -36,6 +36,7 @@ impl Part<'_, '_, '_> {
             pieces: self.divider.growing.pieces(),
             cells: self.waiting.len(),
             more: self.done.map(|()| self.divider.total - START),
+            peak: self.divider.peak - START,
             largest: self.waiting.iter().map(count).max().unwrap_or(0),
             finest: self.divider.finest,
         }
@@ -54,6 +55,8 @@ struct Outcome {
     cells: usize,
     /// By how many the numbers that are listed became more; nothing if there was no room for them.
     more: Option<u64>,
+    /// By how many at the most, also if a grid had been worth it that was not: one thread tries none for which there is no room.
+    peak: u64,
     /// How many numbers the largest of the cells listed.
     largest: u32,
     finest: f64,
@@ -108,6 +111,7 @@ impl<'r> Levels<'r> {
             growing,
             most,
             total,
+            peak: total,
             finest,
         }
     }
@@ -123,9 +127,10 @@ impl<'r> Levels<'r> {
         }
         while done < all {
             for outcome in self.divide_parts(room, done, is_last).into_iter().flatten() {
-                let Outcome { pieces, cells, more, largest, finest } = outcome;
+                let Outcome { pieces, cells, more, peak, largest, finest } = outcome;
                 let total = more.map(|more| self.total + more);
-                let fits = |total: &u64| total + least_growth(largest) <= self.most;
+                let tried = self.total + peak;
+                let fits = |total: &u64| (*total).max(tried) + least_growth(largest) <= self.most;
                 let Some(total) = total.filter(fits) else { return Some(done) };
                 room.growing.join(&pieces, room.waiting.all().get(done..done + cells)?);
                 (self.total, self.finest) = (total, self.finest.max(finest));

@@ -10,8 +10,8 @@ use crate::block::Census;
 use crate::block::cells::{cell_count, resolution_word};
 use crate::caller::{Caller, PARTS};
 use crate::grid::list::List;
+use crate::grid::near::Near;
 use crate::grid::options::GridOptions;
-use crate::grid::overlap::cells_near;
 use crate::grid::space::Space;
 use crate::prim::{GRAIN, Source};
 use crate::scene::Scene;
@@ -39,6 +39,19 @@ struct Part<'p> {
     work: u64,
     /// Whether there was room for the pairs.
     fits: bool,
+}
+
+impl Part<'_> {
+    /// Counts what was looked at, unless that is too much.
+    fn take(&mut self, near: &mut Near, most: u64) {
+        let Part { counts, pairs, work, fits, .. } = self;
+        if *fits && *work <= most {
+            *work += near.take(|cell, id| {
+                counts[cell] += 1;
+                *fits &= pairs.push([cell as u32, id]).is_some();
+            });
+        }
+    }
 }
 
 impl Outermost<'_, '_> {
@@ -121,16 +134,14 @@ impl Outermost<'_, '_> {
     }
 
     fn count_part(&self, space: &Space, part: &mut Part) {
-        let Part { counts, pairs, work, fits, .. } = part;
-        counts.fill(0);
+        let (most, mut near) = (WORK * self.most, Near::new(space));
+        part.counts.fill(0);
         for_each_other(self.scene, self.census, self.large, part.ids.clone(), |prim| {
-            if *fits && *work <= WORK * self.most {
-                *work += cells_near(space, &prim.shape, |cell| {
-                    counts[cell] += 1;
-                    *fits &= pairs.push([cell as u32, prim.id]).is_some();
-                });
+            if near.push(prim.id, &prim.shape) {
+                part.take(&mut near, most);
             }
         });
+        part.take(&mut near, most);
     }
 
     /// Gives each cell its list. Each thread fills those of some cells, and looks at all pairs for that.

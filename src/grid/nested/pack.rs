@@ -202,8 +202,10 @@ impl Emitter<'_, '_, '_> {
         if let Some(lane) = ids.iter().position(|other| *other == id) {
             return Some((*open, lane as u32));
         }
-        let shape = self.shapes.get(id)?;
-        let (block, lane) = self.packer.push(&shape)?;
+        let (block, lane) = match self.shapes.corners(id) {
+            Some(corners) => self.packer.push_triangle(corners)?,
+            None => self.packer.push(&self.shapes.get(id)?)?,
+        };
         let is_sphere = block >= block_ref(KIND_SPHERES, 0);
         let block = block + self.blocks[usize::from(is_sphere)];
         if !is_sphere {

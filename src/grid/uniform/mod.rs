@@ -6,6 +6,7 @@ mod runs;
 mod sort;
 
 use super::Needs;
+use super::narrow::Narrow;
 use super::options::GridOptions;
 use crate::block::cells::resolution_word;
 use crate::block::{Census, Counts, KIND_GRID, LAYOUT_COMPACT, PartsMut};
@@ -66,7 +67,8 @@ fn build_as_planned(
     *grids.first_mut()? = space.head(0, 1);
     let (resolution, words) = words.split_first_mut()?;
     *resolution = resolution_word(space.resolution);
-    Sorter { scene, census, space }.sort(words, prim_ids, rest, caller)?;
+    let cells = Narrow::new(space);
+    Sorter { scene, census, cells: &cells }.sort(words, prim_ids, rest, caller)?;
     caller.done(0.5)?;
     let packing = Counts { runs: 0, ..plan.counts };
     let PartsMut { geometries, prim_ids, sphere_blocks, triangle_blocks, .. } =
@@ -77,7 +79,7 @@ fn build_as_planned(
     pack::pack(source, spheres, triangles.len(), sphere_blocks, caller)?;
     caller.done(0.7)?;
     let packed = Counts { triangle_blocks, ..packing };
-    let runs = runs::write(space, packed.parts_mut(bytes)?, caller)?;
+    let runs = runs::write(&cells, packed.parts_mut(bytes)?, caller)?;
     let counts = Counts { runs, ..packed };
     counts.seal(KIND_GRID, LAYOUT_COMPACT, census, bytes)
 }

@@ -109,7 +109,10 @@ impl<B: Packed> Part<'_, B> {
                 B::packer(self.blocks.get_mut(used..)?, (self.first + i * CHUNK) as u32);
             for (i, id) in ids.iter().enumerate() {
                 shapes.look_ahead(|ahead| ids.get(i + ahead).copied());
-                packer.push(&shapes.get(*id)?)?;
+                match shapes.corners(*id) {
+                    Some(corners) => packer.push_triangle(corners)?,
+                    None => packer.push(&shapes.get(*id)?)?,
+                };
             }
             used += B::used(&packer);
         }

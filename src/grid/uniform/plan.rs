@@ -8,11 +8,14 @@ use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{Census, Counts};
 use crate::caller::Caller;
 use crate::error::BuildError;
+use crate::grid::narrow::{Axis, Narrow};
 use crate::grid::options::GridOptions;
+use crate::grid::sixteen::{Sixteen, ends, for_each_sixteen};
 use crate::grid::space::{Space, cubes, proportions};
 use crate::math::float::cube_root;
-use crate::prim::{GRAIN, Survey, for_each_prim_in};
+use crate::prim::{GRAIN, Survey};
 use crate::scene::Scene;
+use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
 
 /// References from cells to primitives, for each primitive, above which a grid is made coarser. A
 /// scene of large primitives would otherwise fill each cell with all of them.
@@ -122,11 +125,11 @@ impl Plan {
 /// How often cells refer to primitives: a bound on the entries of all runs.
 fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) -> u64 {
     let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
+    let narrow = Narrow::new(space);
     let in_part = |ids: Range<usize>| {
         let mut sum = 0u64;
-        for_each_prim_in(scene, ids.start as u32..ids.end as u32, sound, |prim| {
-            let cells = space.range_of(&prim.shape.aabb()).cell_count();
-            sum = sum.saturating_add(cells);
+        for_each_sixteen(scene, ids, sound, |sixteen| {
+            sum = sum.saturating_add(cells_of(&narrow, sixteen));
         });
         sum
     };
@@ -135,4 +138,35 @@ fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) ->
         all = all.saturating_add(sum);
     });
     all
+}
+
+/// How many cells primitives reach.
+fn cells_of(narrow: &Narrow, sixteen: &Sixteen) -> u64 {
+    let counts = dispatch(CellCounts { narrow, sixteen });
+    counts[..sixteen.count.min(16)].iter().map(|count| *count as u64).sum()
+}
+
+/// Counts the cells that each of sixteen primitives reaches, or a few more.
+struct CellCounts<'a> {
+    narrow: &'a Narrow,
+    sixteen: &'a Sixteen,
+}
+
+impl Kernel for CellCounts<'_> {
+    type Output = [f32; 16];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> [f32; 16] {
+        let one = Width::<16>::splat(s, 1.0);
+        // Two products are rounded, each by less than what that grants.
+        let mut count = Width::<16>::splat(s, 1.0 + 1.0 / (1u32 << 22) as f32);
+        for k in 0..3 {
+            let axis: Axis<_> = self.narrow.axis::<S, 16>(s, k);
+            let [least, largest] = ends(self.sixteen.along(s, k));
+            count = count.mul(axis.last(axis.at(largest)).sub(axis.first(axis.at(least))).add(one));
+        }
+        let mut counts = [0.0; 16];
+        count.store(&mut counts);
+        counts
+    }
 }

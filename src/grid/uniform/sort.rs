@@ -3,10 +3,11 @@
 use crate::block::Census;
 use crate::caller::{Caller, PARTS};
 use crate::grid::list::{List, front};
-use crate::grid::space::Space;
-use crate::math::Aabb;
-use crate::prim::{GRAIN, Shape, for_each_prim_in};
+use crate::grid::narrow::{Axis, Narrow};
+use crate::grid::sixteen::{Sixteen, ends, for_each_sixteen};
+use crate::prim::GRAIN;
 use crate::scene::Scene;
+use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
 use crate::storage::view_mut;
 use core::ops::Range;
 
@@ -14,7 +15,7 @@ use core::ops::Range;
 pub(super) struct Sorter<'s> {
     pub scene: &'s Scene<'s, 's>,
     pub census: &'s Census,
-    pub space: &'s Space,
+    pub cells: &'s Narrow,
 }
 
 /// Pairs of a cell and the number of a primitive.
@@ -68,18 +69,43 @@ impl Sorter<'_> {
     }
 
     fn find_cells_of(&self, ids: Range<usize>, pairs: &mut Pairs) -> Option<()> {
-        let (range, sound) = (ids.start as u32..ids.end as u32, self.census.ignored_count == 0);
-        let mut full = false;
-        for_each_prim_in(self.scene, range, sound, |prim| {
-            full |= pairs.push([self.cell_of(&prim.shape) as u32, prim.id]).is_none();
+        let (sound, mut done) = (self.census.ignored_count == 0, Some(()));
+        for_each_sixteen(self.scene, ids, sound, |sixteen| {
+            done = done.and_then(|()| self.write(sixteen, pairs));
         });
-        (!full).then_some(())
+        done
     }
 
-    fn cell_of(&self, shape: &Shape) -> usize {
-        let Aabb { lower, upper } = shape.aabb();
-        let [lower, upper] = [lower, upper].map(|p| self.space.point(p));
-        self.space.number(self.space.cell_of([0, 1, 2].map(|k| (lower[k] + upper[k]) / 2.0)))
+    /// Writes down the cells of primitives.
+    fn write(&self, sixteen: &Sixteen, pairs: &mut Pairs) -> Option<()> {
+        let [x, y, z] = dispatch(Middles { cells: self.cells, sixteen });
+        let [nx, ny, _] = self.cells.resolution;
+        (0..sixteen.count.min(16)).try_for_each(|lane| {
+            let [x, y, z] = [x[lane] as u32, y[lane] as u32, z[lane] as u32];
+            pairs.push([x + nx * (y + ny * z), sixteen.ids[lane]])
+        })
+    }
+}
+
+/// Finds the cells that the middles of the boxes of sixteen primitives are in.
+struct Middles<'a> {
+    cells: &'a Narrow,
+    sixteen: &'a Sixteen,
+}
+
+impl Kernel for Middles<'_> {
+    type Output = [[f32; 16]; 3];
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> [[f32; 16]; 3] {
+        let half = Width::<16>::splat(s, 0.5);
+        let mut cells = [[0.0; 16]; 3];
+        for (k, cells) in cells.iter_mut().enumerate() {
+            let axis: Axis<_> = self.cells.axis::<S, 16>(s, k);
+            let [least, largest] = ends(self.sixteen.along(s, k));
+            axis.cell(axis.at(least.mul(half).add(largest.mul(half)))).store(cells);
+        }
+        cells
     }
 }
 

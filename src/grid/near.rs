@@ -1,0 +1,190 @@
+//! Which cells of a grid sixteen primitives come near to.
+
+use super::narrow::{Axis, Narrow};
+use super::overlap::{ACROSS, cells_near};
+use super::sixteen::{Sixteen, ends};
+use super::space::Space;
+use crate::prim::Shape;
+use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
+
+/// The cells of a grid, and what is to be looked up in them.
+pub(super) struct Near<'g> {
+    space: &'g Space,
+    narrow: Narrow,
+    /// How far from a cell each of eight is, of which it is the first.
+    steps: [usize; 8],
+    waiting: Sixteen,
+}
+
+impl<'g> Near<'g> {
+    pub fn new(space: &'g Space) -> Self {
+        let [nx, ny, _] = space.resolution.map(|n| n as usize);
+        let steps = [0, 1, 2, 3, 4, 5, 6, 7].map(|o| (o & 1) + nx * ((o >> 1 & 1) + ny * (o >> 2)));
+        Near { space, narrow: Narrow::new(space), steps, waiting: Sixteen::EMPTY }
+    }
+
+    /// Adds a primitive; whether that was the last for which there is room.
+    #[inline(always)]
+    pub fn push(&mut self, id: u32, shape: &Shape) -> bool {
+        self.waiting.push(id, shape)
+    }
+
+    /// The same of a triangle.
+    #[inline(always)]
+    pub fn push_triangle(&mut self, id: u32, corners: [[f32; 3]; 3]) -> bool {
+        self.waiting.push_triangle(id, corners)
+    }
+
+    /// Calls `f` with the numbers of each cell and primitive that come near each other, of those that were added, in the order in which they were; returns
+    /// how many cells were looked at, or how many are near.
+    #[inline(always)]
+    pub fn take(&mut self, mut f: impl FnMut(usize, u32)) -> u64 {
+        let found = dispatch(Find { narrow: &self.narrow, sixteen: &self.waiting });
+        let mut work = 0;
+        for lane in 0..self.waiting.count.min(16) {
+            let id = self.waiting.ids[lane];
+            let mut bits = u32::from(found.bits[lane]);
+            if bits == 0 {
+                work += cells_near(self.space, &self.waiting.shape(lane), |cell| f(cell, id));
+                continue;
+            }
+            let first = self.space.number(found.first.map(|axis| axis[lane] as u32));
+            work += u64::from(bits.count_ones());
+            while bits != 0 {
+                f(first + self.steps[bits.trailing_zeros() as usize % 8], id);
+                bits &= bits - 1;
+            }
+        }
+        self.waiting.clear();
+        work
+    }
+}
+
+/// What was found of sixteen primitives.
+struct Found {
+    /// The first cell along each axis.
+    first: [[f32; 16]; 3],
+    /// One bit for each of the eight cells from there on, `x` first, that a primitive comes near; none if it is too large to tell.
+    bits: [u8; 16],
+}
+
+/// Finds that.
+///
+/// A triangle whose box reaches two cells along each axis at most is held against them as [`Overlap`](super::overlap::Overlap) does, in `f32`, relative to the
+/// first of them: its coordinates are below [`MOST`] then. That they are not the real ones is what [`Narrow`] grants. Sides of edges and the plane are off by less
+/// than `2^10 u` of a cell, which [`ROUNDING`] grants, or the product of two edges; a projection so thin that its orientation is in doubt is left out.
+struct Find<'a> {
+    narrow: &'a Narrow,
+    sixteen: &'a Sixteen,
+}
+
+const MOST: f32 = 8.0;
+const ROUNDING: f32 = 1.0 / (1u32 << 14) as f32;
+const IN_DOUBT: f32 = 1.0 / (1u32 << 20) as f32;
+
+impl Kernel for Find<'_> {
+    type Output = Found;
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) -> Found {
+        let Find { narrow, sixteen } = self;
+        let (zero, most) = (splat(s, 0.0), splat(s, MOST));
+        let mut found = Found { first: [[0.0; 16]; 3], bits: [0; 16] };
+        let mut corners = [[zero; 3]; 3];
+        let (mut small, mut two) = (!(!0 << sixteen.count.min(16)), [0; 3]);
+        for k in 0..3 {
+            let axis: Axis<_> = narrow.axis::<S, 16>(s, k);
+            let [a, b, c] = sixteen.along(s, k);
+            let at = [axis.at(a), axis.at(b), axis.at(c)];
+            let [least, largest] = ends(at);
+            let (first, last) = (axis.first(least), axis.last(largest));
+            first.store(&mut found.first[k]);
+            let more = last.sub(first);
+            small &= more.less_or_equal(splat(s, 1.0));
+            small &= first.sub(least).less_or_equal(most) & largest.sub(first).less_or_equal(most);
+            two[k] = splat(s, 0.5).less(more);
+            corners[k] = [at[0].sub(first), at[1].sub(first), at[2].sub(first)];
+        }
+        let [x, y, z] = two;
+        let (mut near, crooked) = ([small; 8], x & y | y & z | z & x);
+        if small & crooked & sixteen.triangles != 0 {
+            near = cells(s, &corners, narrow);
+        }
+        for (cell, near) in near.iter_mut().enumerate() {
+            let alone = small & !(crooked & sixteen.triangles);
+            *near = *near & small | alone;
+            for (k, two) in two.iter().enumerate() {
+                *near &= if cell >> k & 1 == 1 { *two } else { !0 };
+            }
+        }
+        for (lane, bits) in found.bits.iter_mut().enumerate() {
+            for (cell, near) in near.iter().enumerate() {
+                *bits |= ((near >> lane & 1) as u8) << cell;
+            }
+        }
+        found
+    }
+}
+
+/// The lanes whose triangle comes near each of eight cells, of which the first is at zero.
+#[inline(always)]
+fn cells<S: Simd>(s: S, corners: &[[<S as Width<16>>::V; 3]; 3], narrow: &Narrow) -> [u32; 8] {
+    let zero = splat(s, 0.0);
+    let mut edges = [[zero; 3]; 3];
+    for k in 0..3 {
+        let [a, b, c] = corners[k];
+        edges[k] = [b.sub(a), c.sub(b), a.sub(c)];
+    }
+    let mut sizes = [zero; 2];
+    for axis in &edges {
+        sizes = [sizes[0].add(axis[0].abs()), sizes[1].add(axis[1].abs())];
+    }
+    let rounding = sizes[0].mul(sizes[1]).mul(splat(s, ROUNDING / 2.0));
+    let (mut below, mut above) = (rounding, rounding);
+    let mut normal = [zero; 3];
+    // For each projection the least side of an edge in each of four cells.
+    let mut sides = [[zero; 4]; 3];
+    for (k, [x, y]) in ACROSS.into_iter().enumerate() {
+        let (p, q) = (edges[x][0].mul(edges[y][1]), edges[y][0].mul(edges[x][1]));
+        normal[k] = p.sub(q);
+        let clear = p.abs().add(q.abs()).mul(splat(s, IN_DOUBT)).less(normal[k].abs());
+        let side = Width::<16>::select(s, clear, splat(s, 1.0).flipped_by(normal[k]), zero);
+        let (dx, dy) = (narrow.reach[x] + ROUNDING, narrow.reach[y] + ROUNDING);
+        let (dx, dy, wx, wy) =
+            (splat(s, dx), splat(s, dy), splat(s, 1.0 + 2.0 * dx), splat(s, 1.0 + 2.0 * dy));
+        for i in 0..3 {
+            let (nx, ny) = (zero.sub(edges[y][i]).mul(side), edges[x][i].mul(side));
+            let reach = nx.max(zero).mul(wx).add(ny.max(zero).mul(wy));
+            let from = nx.mul(corners[x][i].add(dx)).add(ny.mul(corners[y][i].add(dy)));
+            let one = reach.sub(from);
+            let two = one.add(ny);
+            let four = [one, one.add(nx), two, two.add(nx)];
+            for (side, other) in sides[k].iter_mut().zip(four) {
+                *side = if i == 0 { other } else { side.min(other) };
+            }
+        }
+        // The plane, from the corner at which it comes first to that at which it comes last.
+        let (d, n) = (splat(s, narrow.reach[k] + ROUNDING), normal[k]);
+        let (near, far) = (zero.sub(n.mul(d)), n.mul(splat(s, 1.0).add(d)));
+        let at = n.mul(corners[k][0]);
+        below = below.add(at.sub(near.min(far)));
+        above = above.sub(at.sub(near.max(far)));
+    }
+    let mut near = [0; 8];
+    for (cell, near) in near.iter_mut().enumerate() {
+        let [x, y, z] = [cell & 1, cell >> 1 & 1, cell >> 2];
+        let mut at = zero;
+        for (k, one) in [x, y, z].into_iter().enumerate() {
+            at = if one == 1 { at.add(normal[k]) } else { at };
+        }
+        let plane = below.sub(at).min(above.add(at));
+        let side = sides[0][y + 2 * z].min(sides[1][z + 2 * x]).min(sides[2][x + 2 * y]);
+        *near = zero.less_or_equal(plane.min(side));
+    }
+    near
+}
+
+#[inline(always)]
+fn splat<S: Simd>(s: S, x: f32) -> <S as Width<16>>::V {
+    Width::<16>::splat(s, x)
+}
