@@ -60,7 +60,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         "levels",
         &["batch", "block", "bvh", "instance", "math", "prim", "query", "ray", "simd", "trace"],
     ),
-    ("hits", &["block", "levels", "query", "ray", "trace"]),
+    ("hits", &["block", "levels", "query", "ray", "simd", "trace"]),
     (
         "closest",
         &["block", "bvh", "grid", "kinds", "levels", "math", "point", "prim", "query", "ray"],
