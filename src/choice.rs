@@ -7,18 +7,18 @@ use crate::prim::{for_each_counted, for_each_prim_in};
 use crate::scene::Scene;
 use glam::DVec3;
 
-/// Below this many rays for each primitive a uniform grid saves more time while it is built than its rays lose, if lists are short and
-/// primitives are compact.
-const FEW_RAYS: f32 = 0.5;
+/// Below this many rays for each primitive a uniform grid saves more time while it is built than its rays lose, if primitives are
+/// compact and not crowded.
+const FEW_RAYS: f32 = 0.6;
 /// The same where they are in order, as trees are built faster then.
-const FEW_IN_ORDER: f32 = 0.12;
+const FEW_IN_ORDER: f32 = 0.5;
+/// The same where they are not compact, and are in many cells each.
+const FEW_SCATTERED: f32 = 0.08;
 
-/// Lists are short if so many primitives at most are in the longest, times the rays for each primitive: for what a ray may have to test.
-const SHORT: f32 = 285.0;
-/// And if so many at most are in the cells along an axis where lists are as long as where the primitives are, times the same.
-const FEW_ALONG: f32 = 2900.0;
+/// So [crowded](Spread::crowd), half as many rays are few.
+const CROWD: f32 = 250.0;
 
-/// Primitives are compact if the box of one lies in up to this many cells on average.
+/// Primitives are compact if the box of one lies in up to this many cells, in the harmonic mean: a few may be long.
 const COMPACT: f64 = 4.0;
 
 /// Primitives are in order if this share of them is near the one before: along each axis by this part of the box.
@@ -30,21 +30,21 @@ pub(crate) fn suits_grid(scene: &Scene, census: &Census, rays_per_prim: f32) -> 
     if !(0.0 < rays_per_prim && rays_per_prim < FEW_RAYS) {
         return false;
     }
-    let Spread { longest, mean, cells, in_order } = Spread::of(scene, census);
-    let order_allows = rays_per_prim < FEW_IN_ORDER || in_order < IN_ORDER;
-    let along = mean * cube_root(f64::from(census.hittable())) as f32;
-    let lists_are_short =
-        longest as f32 * rays_per_prim <= SHORT && along * rays_per_prim <= FEW_ALONG;
-    lists_are_short && cells <= COMPACT && order_allows
+    let Spread { crowd, cells, in_order } = Spread::of(scene, census);
+    let few = match () {
+        () if cells > COMPACT => FEW_SCATTERED,
+        () if in_order < IN_ORDER => FEW_RAYS,
+        () => FEW_IN_ORDER,
+    };
+    rays_per_prim * (1.0 + crowd / CROWD) < few
 }
 
 /// How primitives lie in the box around them, in a grid with as many cells along each axis as the cube root of their number.
 struct Spread {
-    /// How many centres are in the fullest cell in which one of a sample is.
-    longest: u32,
-    /// How many are in the cell in which one of them is, on average.
-    mean: f32,
-    /// The cells in which the box of one lies on average.
+    /// How many are in the cell in which one of them is, on average, times the share of all that this is: what a ray has to test
+    /// there, as likely as it is to come there.
+    crowd: f32,
+    /// The cells in which the box of one lies, in the harmonic mean.
     cells: f64,
     /// The share of them that is near the one before.
     in_order: f64,
@@ -61,21 +61,21 @@ impl Spread {
                 lists.begin(grid.cell(wide(aabb.lower), wide(aabb.upper)));
             });
         }
-        let (mut cells, mut near, mut before) = (0.0, 0u32, DVec3::INFINITY);
+        let (mut of_cells, mut near, mut before) = (0.0, 0u32, DVec3::INFINITY);
         for_each_counted(scene, census, |prim| {
             let aabb = prim.shape.aabb();
             let (from, to) = (wide(aabb.lower), wide(aabb.upper));
             lists.count(grid.cell(from, to));
             // Not NaN, as in a flat axis.
             let sides = ((to - from) * grid.per_length).to_array().map(|side| 1.0 + side.max(0.0));
-            cells += sides[0] * sides[1] * sides[2];
+            of_cells += 1.0 / (sides[0] * sides[1] * sides[2]);
             let moved = (from - before).abs();
             near += u32::from(!moved.cmpgt(grid.near).any());
             before = from;
         });
-        let all = f64::from(census.hittable());
-        let (longest, mean) = (lists.longest(), lists.mean());
-        Spread { longest, mean, cells: cells / all, in_order: f64::from(near) / all }
+        let (all, mean) = (f64::from(census.hittable()), lists.mean());
+        let crowd = mean * mean / all as f32;
+        Spread { crowd, cells: all / of_cells, in_order: f64::from(near) / all }
     }
 }
 
@@ -151,9 +151,5 @@ impl Lists {
         let counts = self.counts.iter().zip(&self.samples);
         let sum: f32 = counts.map(|(count, samples)| *count as f32 * *samples as f32).sum();
         sum / self.samples.iter().sum::<u32>().max(1) as f32
-    }
-
-    fn longest(&self) -> u32 {
-        self.counts.iter().fold(0, |longest, count| longest.max(*count))
     }
 }

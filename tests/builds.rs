@@ -323,7 +323,7 @@ fn memory_of_a_cancelled_build_may_be_used_again() {
     });
 }
 
-/// A BVH where rays are many, the scene uneven or its triangles long, a grid where rays are few, and with more rays only where triangles are
+/// A BVH where rays are many, triangles crowded or long, a grid where rays are few, and with more rays only where triangles are
 /// in no order; a list for a handful.
 #[test]
 fn the_choice_follows_the_rays_and_the_scene() {
@@ -336,10 +336,10 @@ fn the_choice_follows_the_rays_and_the_scene() {
         (0..count).map(|i| surface.meshes[0].indices[i * 1009 % count]).collect();
     let mut stadium = surface.clone();
     stadium.meshes.push(make::plane(50).placed(1e3, [-5e2, -5e2, -1.0]));
-    let mut crowd: Model = make::blob(3_000, 0).placed(2e-3, [0.0; 3]).into();
+    let mut objects: Model = make::blob(3_000, 0).placed(2e-3, [0.0; 3]).into();
     for i in 1..64u32 {
         let place = [i % 4, i / 4 % 4, i / 16].map(f64::from);
-        crowd.meshes.push(make::blob(3_000, i.into()).placed(2e-3, place));
+        objects.meshes.push(make::blob(3_000, i.into()).placed(2e-3, place));
     }
     let kind_of = |model: &Model, rays_per_prim: f32| {
         let options = BuildOptions { rays_per_prim, ..BuildOptions::default() };
@@ -354,10 +354,10 @@ fn the_choice_follows_the_rays_and_the_scene() {
         assert_eq!(kind_of(&surface, rays), Kind::Bvh, "{rays}");
     }
     assert_eq!(kind_of(&surface, 0.05), Kind::Grid);
-    assert_eq!((kind_of(&surface, 0.3), kind_of(&mixed, 0.3)), (Kind::Bvh, Kind::Grid));
-    assert_eq!((kind_of(&mixed, 0.6), kind_of(&stadium, 0.08)), (Kind::Bvh, Kind::Bvh));
-    assert_eq!(kind_of(&hair, 0.05), Kind::Bvh);
-    // No list is long, but all are where rays go.
-    assert_eq!(kind_of(&crowd, 0.05), Kind::Bvh);
+    assert_eq!((kind_of(&surface, 0.55), kind_of(&mixed, 0.55)), (Kind::Bvh, Kind::Grid));
+    assert_eq!((kind_of(&mixed, 0.7), kind_of(&stadium, 0.08)), (Kind::Bvh, Kind::Bvh));
+    assert_eq!((kind_of(&hair, 0.1), kind_of(&hair, 0.05)), (Kind::Bvh, Kind::Grid));
+    // Where they are, lists are long, but few rays come there.
+    assert_eq!(kind_of(&objects, 0.05), Kind::Grid);
     assert_eq!(kind_of(&handful, 0.05), Kind::List);
 }
