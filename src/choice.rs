@@ -19,7 +19,7 @@ const FEW_SCATTERED: f32 = 0.08;
 const CROWD: f32 = 250.0;
 
 /// Primitives are compact if the box of one lies in up to this many cells, in the harmonic mean: a few may be long.
-const COMPACT: f64 = 4.0;
+const COMPACT: f64 = 3.0;
 
 /// Primitives are in order if this share of them is near the one before: along each axis by this part of the box.
 const IN_ORDER: f64 = 0.95;
