@@ -12,17 +12,20 @@ use glam::DVec3;
 const FEW_RAYS: f32 = 0.6;
 /// The same where they are in order, as trees are built faster then.
 const FEW_IN_ORDER: f32 = 0.5;
-/// The same where they are not compact, and are in many cells each.
-const FEW_SCATTERED: f32 = 0.08;
+/// The same where they are not compact or, in order, [thick](Spread::is_thick).
+const FEW_IN_SLOW_CELLS: f32 = 0.06;
 
 /// So [crowded](Spread::crowd), half as many rays are few.
 const CROWD: f32 = 250.0;
+
+/// Lists of more are long.
+const LONG: f32 = 200.0;
 
 /// Primitives are compact if the box of one lies in up to this many cells, in the harmonic mean: a few may be long.
 const COMPACT: f64 = 3.0;
 
 /// Primitives are in order if this share of them is near the one before: along each axis by this part of the box.
-const IN_ORDER: f64 = 0.95;
+const IN_ORDER: f64 = 0.975;
 const NEAR: f64 = 1.0 / 32.0;
 
 /// Whether a uniform grid is likely to take less time than a BVH, with so many rays for each primitive until it is built again.
@@ -30,19 +33,21 @@ pub(crate) fn suits_grid(scene: &Scene, census: &Census, rays_per_prim: f32) -> 
     if !(0.0 < rays_per_prim && rays_per_prim < FEW_RAYS) {
         return false;
     }
-    let Spread { crowd, cells, in_order } = Spread::of(scene, census);
+    let spread = Spread::of(scene, census);
     let few = match () {
-        () if cells > COMPACT => FEW_SCATTERED,
-        () if in_order < IN_ORDER => FEW_RAYS,
+        () if spread.cells > COMPACT => FEW_IN_SLOW_CELLS,
+        () if spread.in_order < IN_ORDER => FEW_RAYS,
+        () if spread.is_thick() => FEW_IN_SLOW_CELLS,
         () => FEW_IN_ORDER,
     };
-    rays_per_prim * (1.0 + crowd / CROWD) < few
+    rays_per_prim * (1.0 + spread.crowd / CROWD) < few
 }
 
 /// How primitives lie in the box around them, in a grid with as many cells along each axis as the cube root of their number.
 struct Spread {
-    /// How many are in the cell in which one of them is, on average, times the share of all that this is: what a ray has to test
-    /// there, as likely as it is to come there.
+    /// How many are in the cell in which one of them is, on average.
+    mean: f32,
+    /// That times the share of all that it is: what a ray has to test there, as likely as it is to come there.
     crowd: f32,
     /// The cells in which the box of one lies, in the harmonic mean.
     cells: f64,
@@ -75,7 +80,13 @@ impl Spread {
         });
         let (all, mean) = (f64::from(census.hittable()), lists.mean());
         let crowd = mean * mean / all as f32;
-        Spread { crowd, cells: all / of_cells, in_order: f64::from(near) / all }
+        Spread { mean, crowd, cells: all / of_cells, in_order: f64::from(near) / all }
+    }
+
+    /// Whether cells are full all over large objects, so that many rays come to them: lists are long, and in more cells than
+    /// a list is long.
+    fn is_thick(&self) -> bool {
+        self.mean > LONG && self.crowd < 1.0
     }
 }
 

@@ -341,6 +341,11 @@ fn the_choice_follows_the_rays_and_the_scene() {
         let place = [i % 4, i / 4 % 4, i / 16].map(f64::from);
         objects.meshes.push(make::blob(3_000, i.into()).placed(2e-3, place));
     }
+    let mut dense: Model = make::blob(30_000, 0).placed(0.15, [0.0; 3]).into();
+    for i in 1..8u32 {
+        let place = [i % 2, i / 2 % 2, i / 4].map(|x| 3.0 * f64::from(x));
+        dense.meshes.push(make::blob(30_000, i.into()).placed(0.15, place));
+    }
     let kind_of = |model: &Model, rays_per_prim: f32| {
         let options = BuildOptions { rays_per_prim, ..BuildOptions::default() };
         model.with_scene(|scene| {
@@ -359,5 +364,6 @@ fn the_choice_follows_the_rays_and_the_scene() {
     assert_eq!((kind_of(&hair, 0.1), kind_of(&hair, 0.05)), (Kind::Bvh, Kind::Grid));
     // Where they are, lists are long, but few rays come there.
     assert_eq!(kind_of(&objects, 0.05), Kind::Grid);
+    assert_eq!((kind_of(&dense, 0.1), kind_of(&dense, 0.05)), (Kind::Bvh, Kind::Grid));
     assert_eq!(kind_of(&handful, 0.05), Kind::List);
 }
