@@ -37,6 +37,9 @@ impl Effort {
         even: 64.0,
         cuts: false,
     };
+    /// No plane is looked for: nodes are halved. For trees that are to be mended.
+    #[cfg(test)]
+    pub const HASTY: Effort = Effort { bins: 1, ..Effort::BALANCED };
     pub const BEST: Effort = Effort {
         bins: BINS,
         samples: ALL,

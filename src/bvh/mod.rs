@@ -14,6 +14,7 @@ mod fill;
 mod fits;
 mod order;
 mod places;
+mod plan;
 mod refit;
 mod refs;
 mod reinsert;

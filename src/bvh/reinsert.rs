@@ -256,7 +256,7 @@ mod tests {
     const AREAS: Aabb = Aabb { lower: [0.0; 3], upper: [1.0; 3] };
 
     /// The tree over these refs, and their ids.
-    fn tree(mut refs: Vec<PrimRef>) -> (Vec<BvhNode>, Vec<u32>) {
+    fn tree(mut refs: Vec<PrimRef>, effort: Effort) -> (Vec<BvhNode>, Vec<u32>) {
         let count = refs.len();
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * count];
         let limits = Limits {
@@ -265,7 +265,7 @@ mod tests {
             leaf_max: 5,
             mixed: false,
             depth: Depth::Deep,
-            effort: Effort::FAST,
+            effort,
             even: None,
         };
         let caller = &Caller::new(None, None);
@@ -323,17 +323,17 @@ mod tests {
             let upper = [lower[0] + long * next(), lower[1] + long * next(), lower[2] + 0.01];
             PrimRef::new(id, &Aabb { lower, upper }, false)
         });
-        let (nodes, ids) = tree(refs.collect());
+        let (nodes, ids) = tree(refs.collect(), Effort::HASTY);
         let better = cost(&mended(&nodes, &ids)) / cost(&nodes);
         // One of 64 nodes is looked at, twice.
-        assert!(better < 0.998, "{better} of the cost");
+        assert!(better < 0.995, "{better} of the cost");
     }
 
     #[test]
     fn mended_trees_are_no_deeper_than_the_stack() {
         let mut deepest = 0;
         for ratio in [1.1f64, 1.5, 2.0, 4.0] {
-            let (nodes, ids) = tree(series((240.0 / ratio.log2()) as usize, ratio));
+            let (nodes, ids) = tree(series((240.0 / ratio.log2()) as usize, ratio), Effort::FAST);
             deepest = deepest.max(levels(&mended(&nodes, &ids)));
         }
         assert!(deepest > 40 && deepest <= MAX_DEPTH, "{deepest}");

@@ -2,40 +2,25 @@
 
 use super::How;
 use super::branch::{Size, grow};
-use super::budget::leaf_budget;
 use super::choose::choose;
 use super::collapse::Grounds;
 use super::compact;
 use super::emit::{Chosen, Sizes};
 use super::fill::{pack, take_marks_off};
 use super::places::{PAIR, Places};
-use super::refs::{PrimRef, gather, refs_per_prim};
+use super::plan::{Plan, leaf_max};
+use super::refs::PrimRef;
 use super::reinsert::mend;
-use super::runs::{name_ids, put_into_runs};
+use super::runs::name_ids;
 use super::split::Areas;
-use super::spread::unevenness_of_all;
 use super::tree::{Depth, Limits};
 use crate::block::bundle::{Bundle, LANE};
-use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, Geometry, KIND_BVH, PartsMut};
 use crate::caller::Caller;
 use crate::error::BuildError;
 use crate::prim::{Source, Survey, geometries};
 use crate::scene::Scene;
 use crate::storage::{self, ALIGNMENT, Plain};
-
-/// Primitives of a leaf of the binary tree at most: any five triangles fit into a block.
-const LEAF_MAX: usize = TRIANGLES_AT_LEAST;
-
-/// Strips of a leaf at most, of `strip` triangles each: such a strip has two vertices more than triangles. In an index
-/// every instance is a leaf.
-fn leaf_max(census: &Census, strip: usize) -> usize {
-    match strip {
-        _ if census.is_index => 1,
-        1 => LEAF_MAX,
-        _ => TRIANGLES / (strip + 2),
-    }
-}
 
 /// What nodes, choice and id of a leaf of one primitive take.
 const SCRATCH: u64 = (PAIR + size_of::<u64>() + size_of::<u32>()) as u64;
@@ -160,29 +145,11 @@ fn grow_tree(
     let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
     geometries(scene, table.parts_mut(bytes)?.geometries);
     let areas = Areas::new(&census.bounds);
-    let size = bytes.len();
     let (front, rest) = bytes.split_at_mut_checked(places.refs)?;
     let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
     let source = Source { scene, geometries, named: false };
-    let refs = storage::view_mut::<PrimRef>(rest, 0, places.room)?;
-    let Gathered { count, strip, leaves } = gather_strips(scene, census, places.leaves, how, refs);
-    let refs = refs.get(..count)?;
-    let uneven = how.effort.for_uneven(unevenness_of_all(refs, areas, how.caller));
-    let prims = census.hittable();
-    let runs = match uneven {
-        None if how.effort.runs && census.triangle_count == prims => {
-            put_into_runs((count, prims as usize), &places, source, areas, rest)
-        }
-        _ => None,
-    };
-    // Spheres are not cut, nor is what will move.
-    let cut = uneven.is_some_and(|effort| effort.cuts) && census.sphere_count == 0 && !census.refit;
-    let in_runs = runs.is_some();
-    let places = match (runs, uneven) {
-        (Some(runs), _) => runs,
-        (None, Some(_)) => places.for_uneven(count, leaves, cut, size),
-        (None, None) => Places { leaves, ..places },
-    };
+    let Plan { places, count, leaf_max, uneven, cut, in_runs } =
+        Plan::new(census, places, how, source, rest)?;
     let (refs, tail) = rest.split_at_mut_checked(places.nodes - places.refs)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
     let slots = storage::view_mut::<PrimRef>(refs, 0, places.room)?;
@@ -190,7 +157,7 @@ fn grow_tree(
     let limits = Limits {
         leaves: places.leaves,
         source: cut.then_some(source),
-        leaf_max: if in_runs { 1 } else { leaf_max(census, strip) },
+        leaf_max,
         mixed: census.is_mixed(),
         depth: match uneven {
             Some(_) => Depth::Alike,
@@ -200,7 +167,6 @@ fn grow_tree(
         effort,
         even: uneven.map(|_| how.effort),
     };
-    let count = if in_runs { places.room } else { count };
     let size = grow(nodes, slots, count, &limits, how.caller)?;
     let (free, ids) = ids_to_end(refs, &size)?;
     if in_runs {
@@ -209,43 +175,7 @@ fn grow_tree(
     if uneven.is_some() {
         mend(nodes.get_mut(..size.nodes)?, ids, areas, free)?;
     }
-    Some(Scratch { in_runs, ..Scratch::new(&places, &size)? })
-}
-
-/// So many refs, of as many as there would be at the least, and strips are not worth it.
-const FOLLOWED: f32 = 1.6;
-
-/// Refs of up to `strip` triangles, and the leaves that a tree over them may have.
-struct Gathered {
-    count: usize,
-    strip: usize,
-    leaves: usize,
-}
-
-/// Gathers refs of the longest strips for which there is room, which is `room` leaves.
-fn gather_strips(
-    scene: &Scene,
-    census: &Census,
-    room: usize,
-    how: &How,
-    refs: &mut [PrimRef],
-) -> Gathered {
-    let mixed = census.is_mixed();
-    let mut strip = if mixed || census.is_index { 1 } else { how.effort.strip };
-    // Where few triangles follow a neighbour, strips are but more leaves.
-    while strip > 1 && refs_per_prim(scene, census, strip, refs) > FOLLOWED / strip as f32 {
-        strip /= 2;
-    }
-    loop {
-        let count = gather(scene, census, strip, how.caller, refs);
-        let least = leaf_budget(count, mixed, leaf_max(census, strip), false);
-        // Where strips are shorter than they may be, there may be more leaves than room for them.
-        if least <= room || strip == 1 {
-            let leaves = room.min(count / 2).max(least);
-            return Gathered { count, strip, leaves };
-        }
-        strip /= 2;
-    }
+    Scratch::new(&places, &size, in_runs)
 }
 
 /// Moves the ids of all refs to the end of their place; returns what is free before them, and them.
@@ -286,12 +216,12 @@ struct Scratch {
 }
 
 impl Scratch {
-    fn new(places: &Places, size: &Size) -> Option<Scratch> {
+    fn new(places: &Places, size: &Size, in_runs: bool) -> Option<Scratch> {
         let pairs = size.nodes / 2 - 1;
         let ids = places.nodes - 4 * size.prims;
         let choices = (ids / 8 * 8).checked_sub(8 * pairs)?;
         let (prims, nodes, node_count) = (size.prims, places.nodes, size.nodes);
-        Some(Scratch { choices, pairs, ids, prims, nodes, node_count, in_runs: false })
+        Some(Scratch { choices, pairs, ids, prims, nodes, node_count, in_runs })
     }
 
     fn choose<const W: usize>(
@@ -337,5 +267,3 @@ impl Scratch {
         chosen.emit(bundles, prim_ids, first_sphere)
     }
 }
-
-const _: () = assert!(SPHERES >= LEAF_MAX);

@@ -131,38 +131,23 @@ impl Kernel for Find<'_> {
 fn cells<S: Simd>(s: S, corners: &[[<S as Width<16>>::V; 3]; 3], narrow: &Narrow) -> [u32; 8] {
     let zero = splat(s, 0.0);
     let mut edges = [[zero; 3]; 3];
+    let mut sizes = [zero; 2];
     for k in 0..3 {
         let [a, b, c] = corners[k];
         edges[k] = [b.sub(a), c.sub(b), a.sub(c)];
-    }
-    let mut sizes = [zero; 2];
-    for axis in &edges {
-        sizes = [sizes[0].add(axis[0].abs()), sizes[1].add(axis[1].abs())];
+        sizes = [sizes[0].add(edges[k][0].abs()), sizes[1].add(edges[k][1].abs())];
     }
     let rounding = sizes[0].mul(sizes[1]).mul(splat(s, ROUNDING / 2.0));
     let (mut below, mut above) = (rounding, rounding);
     let mut normal = [zero; 3];
-    // For each projection the least side of an edge in each of four cells.
     let mut sides = [[zero; 4]; 3];
     for (k, [x, y]) in ACROSS.into_iter().enumerate() {
         let (p, q) = (edges[x][0].mul(edges[y][1]), edges[y][0].mul(edges[x][1]));
         normal[k] = p.sub(q);
         let clear = p.abs().add(q.abs()).mul(splat(s, IN_DOUBT)).less(normal[k].abs());
-        let side = Width::<16>::select(s, clear, splat(s, 1.0).flipped_by(normal[k]), zero);
-        let (dx, dy) = (narrow.reach[x] + ROUNDING, narrow.reach[y] + ROUNDING);
-        let (dx, dy, wx, wy) =
-            (splat(s, dx), splat(s, dy), splat(s, 1.0 + 2.0 * dx), splat(s, 1.0 + 2.0 * dy));
-        for i in 0..3 {
-            let (nx, ny) = (zero.sub(edges[y][i]).mul(side), edges[x][i].mul(side));
-            let reach = nx.max(zero).mul(wx).add(ny.max(zero).mul(wy));
-            let from = nx.mul(corners[x][i].add(dx)).add(ny.mul(corners[y][i].add(dy)));
-            let one = reach.sub(from);
-            let two = one.add(ny);
-            let four = [one, one.add(nx), two, two.add(nx)];
-            for (side, other) in sides[k].iter_mut().zip(four) {
-                *side = if i == 0 { other } else { side.min(other) };
-            }
-        }
+        let turn = Width::<16>::select(s, clear, splat(s, 1.0).flipped_by(normal[k]), zero);
+        let reach = [x, y].map(|axis| narrow.reach[axis] + ROUNDING);
+        sides[k] = least_sides(s, [corners[x], corners[y]], [edges[x], edges[y]], turn, reach);
         // The plane, from the corner at which it comes first to that at which it comes last.
         let (d, n) = (splat(s, narrow.reach[k] + ROUNDING), normal[k]);
         let (near, far) = (zero.sub(n.mul(d)), n.mul(splat(s, 1.0).add(d)));
@@ -182,6 +167,34 @@ fn cells<S: Simd>(s: S, corners: &[[<S as Width<16>>::V; 3]; 3], narrow: &Narrow
         *near = zero.less_or_equal(plane.min(side));
     }
     near
+}
+
+/// Of a projection, how far the corner of each of four squares that is furthest inside of an edge is, at the edge for which that is the least; for triangles that turn
+/// as the signs of `turn` say, and nothing where that is zero.
+#[inline(always)]
+fn least_sides<S: Simd>(
+    s: S,
+    [xs, ys]: [[<S as Width<16>>::V; 3]; 2],
+    [along_x, along_y]: [[<S as Width<16>>::V; 3]; 2],
+    turn: <S as Width<16>>::V,
+    [reach_x, reach_y]: [f32; 2],
+) -> [<S as Width<16>>::V; 4] {
+    let zero = splat(s, 0.0);
+    let (dx, dy) = (splat(s, reach_x), splat(s, reach_y));
+    let (wx, wy) = (splat(s, 1.0 + 2.0 * reach_x), splat(s, 1.0 + 2.0 * reach_y));
+    let mut sides = [zero; 4];
+    for i in 0..3 {
+        let (nx, ny) = (zero.sub(along_y[i]).mul(turn), along_x[i].mul(turn));
+        let reach = nx.max(zero).mul(wx).add(ny.max(zero).mul(wy));
+        let from = nx.mul(xs[i].add(dx)).add(ny.mul(ys[i].add(dy)));
+        let one = reach.sub(from);
+        let two = one.add(ny);
+        let four = [one, one.add(nx), two, two.add(nx)];
+        for (side, other) in sides.iter_mut().zip(four) {
+            *side = if i == 0 { other } else { side.min(other) };
+        }
+    }
+    sides
 }
 
 #[inline(always)]

@@ -28,16 +28,9 @@ impl<D: Doubles> PlaneMeeting<D> {
     pub fn new(direction: Vector<D>, to_plane: Vector<D>, [e1, e2]: [Vector<D>; 2]) -> Self {
         let n = cross(e1, e2);
         let along = dot(direction, n);
-        // Four roundings in `n`, one in `to_plane`, three in either dot product.
-        let size = sum_abs(e1).times(gamma(8)).mul(sum_abs(e2));
-        let along_error = sum_abs(direction).mul(size);
-        let clear = along_error.times(1024.0).less(along.abs());
         let t = dot(to_plane, n).div(along);
-        // A hundredth for the divisor's own error, and the roundings of the quotient. What does not wait for `t` is divided
-        // beside it.
-        let fixed = sum_abs(to_plane).mul(size).times(1.01).div(along.abs());
-        let by_t = along_error.times(1.01).div(along.abs());
-        let t_error = fixed.add(t.abs().mul(by_t)).add(t.abs().times(3.0 * UNIT));
+        let sizes = [sum_abs(direction), sum_abs(to_plane), sum_abs(e1), sum_abs(e2)];
+        let (t_error, clear) = error(t, along, sizes);
         let aside = cross(to_plane, direction);
         let weights = [dot(e2, aside).div(along), dot(e1, aside).neg().div(along)];
         PlaneMeeting { t, t_error, weights, along, clear }
@@ -61,15 +54,24 @@ impl PlaneMeeting<f64> {
         let sizes = Quad::sums([direction.abs(), to_plane.abs(), e1.abs(), e2.abs()]);
         let [along, ..] = products.array();
         let [_, t, u, v] = products.div(products.first()).array();
-        let [length, distance, first, second] = sizes.array();
-        let size = first * gamma(8) * second;
-        let along_error = length * size;
-        let clear = u32::from(along_error * 1024.0 < along.abs());
-        let fixed = distance * size * 1.01 / along.abs();
-        let by_t = along_error * 1.01 / along.abs();
-        let t_error = fixed + t.abs() * by_t + t.abs() * (3.0 * UNIT);
+        let (t_error, clear) = error(t, along, sizes.array());
         PlaneMeeting { t, t_error, weights: [u, -v], along, clear }
     }
+}
+
+/// What `t` may be off, and whether that is clear, one bit a lane; from the sums of absolute coordinates of the direction, of the way to the plane
+/// and of both edges.
+#[inline(always)]
+fn error<D: Doubles>(t: D, along: D, [direction, to_plane, e1, e2]: [D; 4]) -> (D, u32) {
+    // Four roundings in the normal, one in the way to the plane, three in either dot product.
+    let size = e1.times(gamma(8)).mul(e2);
+    let along_error = direction.mul(size);
+    let clear = along_error.times(1024.0).less(along.abs());
+    // A hundredth for the divisor's own error, and the roundings of the quotient. What does not wait for `t` is divided
+    // beside it.
+    let fixed = to_plane.mul(size).times(1.01).div(along.abs());
+    let by_t = along_error.times(1.01).div(along.abs());
+    (fixed.add(t.abs().mul(by_t)).add(t.abs().times(3.0 * UNIT)), clear)
 }
 
 /// `a x b`, by the operations of [`cross`].

@@ -211,12 +211,6 @@ pub(crate) trait Decide {
         (!in_doubt || Self::is_met(ray, &met, watch)).then_some(met)
     }
 
-    /// `t` and weights of a triangle that the ray surely meets within its limits, if that takes no more than a look.
-    #[inline(always)]
-    fn sure<S: Simd>(_: S, _ray: &PreparedRay, _lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
-        None
-    }
-
     /// The same, and whether it is in doubt: then [`is_met`](Self::is_met) tells.
     fn likely(
         ray: &PreparedRay,
@@ -228,6 +222,12 @@ pub(crate) trait Decide {
     #[inline(always)]
     fn is_met(_ray: &PreparedRay, _met: &Self::Met, _watch: &mut impl Watch) -> bool {
         true
+    }
+
+    /// `t` and weights of a triangle that the ray surely meets within its limits, if that takes no more than a look.
+    #[inline(always)]
+    fn sure<S: Simd>(_: S, _ray: &PreparedRay, _lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
+        None
     }
 
     /// The meetings with a sphere that lie within the limits, entering and leaving.

@@ -10,7 +10,7 @@ use crate::ray::{Interval, PreparedRay};
 /// Most rays that hit anything compute one `t` so, and no node waits for it.
 pub(super) struct Waiting<'m> {
     blocks: &'m [TriangleBlock],
-    /// The number of its block; [`NOBODY`] if there is none.
+    /// The number of its block; [`NOBODY`], which no block has, if nothing waits.
     block: u32,
     lane: u32,
     /// What is met before this `t` of the frame comes before all that was met so far.
@@ -27,10 +27,10 @@ impl<'m> Waiting<'m> {
         Waiting { blocks, block: NOBODY, lane: 0, first_before }
     }
 
-    /// Takes the triangle in this lane, which the ray meets in this part of itself, if it comes first and within the ray's
-    /// limits; whether it does.
+    /// Takes the triangle in this lane, which the ray surely meets in this part of itself, if that comes first and is within the
+    /// ray's limits; whether it does.
     ///
-    /// Both limits of the frame are less than an ulp outside of the given ones, so what is beyond neither, nor at it, is within those.
+    /// The frame's limits are less than an ulp outside of the given ones: what lies strictly between them is within those.
     #[inline(always)]
     pub fn takes(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
         let first = ray.t_min < part.near && part.far < self.first_before;
@@ -51,12 +51,8 @@ impl<'m> Waiting<'m> {
     /// The same, which waits no longer; nor does any that comes after it.
     #[inline(always)]
     pub fn end(&mut self) -> Option<TriangleLane<'m>> {
-        self.first_before = f32::NEG_INFINITY;
-        if self.block == NOBODY {
-            return None;
-        }
         let lane = self.lane();
-        self.block = NOBODY;
+        (self.block, self.first_before) = (NOBODY, f32::NEG_INFINITY);
         lane
     }
 }

@@ -1,6 +1,6 @@
 //! Doubles side by side: what is computed for one is computed for several by the same operations.
 
-/// One double, or eight.
+/// One double, four or eight.
 pub(crate) trait Doubles: Copy {
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
@@ -75,7 +75,7 @@ macro_rules! each {
 }
 
 /// Portable: the definition of the others.
-impl Doubles for [f64; 8] {
+impl<const N: usize> Doubles for [f64; N] {
     each!(add sub mul div);
 
     fn times(self, factor: f64) -> Self {
@@ -91,7 +91,7 @@ impl Doubles for [f64; 8] {
     }
 
     fn less(self, other: Self) -> u32 {
-        (0..8).fold(0, |bits, i| bits | self[i].less(other[i]) << i)
+        (0..N).fold(0, |bits, i| bits | self[i].less(other[i]) << i)
     }
 }
 
@@ -115,26 +115,6 @@ pub(crate) trait Quad: Doubles {
     /// Of each vector the sum of its first two numbers, and of that and the third. What is beside them does not count.
     fn sums(vectors: [Self; 4]) -> Self;
     fn array(self) -> [f64; 4];
-}
-
-impl Doubles for [f64; 4] {
-    each!(add sub mul div);
-
-    fn times(self, factor: f64) -> Self {
-        self.map(|x| x * factor)
-    }
-
-    fn abs(self) -> Self {
-        self.map(Doubles::abs)
-    }
-
-    fn neg(self) -> Self {
-        self.map(|x| -x)
-    }
-
-    fn less(self, other: Self) -> u32 {
-        (0..4).fold(0, |bits, i| bits | self[i].less(other[i]) << i)
-    }
 }
 
 impl Quad for [f64; 4] {

@@ -203,10 +203,8 @@ impl<'m> Question<'m> for ClosestMet {
     const RARE: bool = true;
 
     fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        {
-            let filter = Filter::new(self.0, block.geometries, block.prim_ids);
-            Closest::new(filter, block.triangle_blocks, t_max, ())
-        }
+        let filter = Filter::new(self.0, block.geometries, block.prim_ids);
+        Closest::new(filter, block.triangle_blocks, t_max, ())
     }
 
     fn answer<S: Simd>(

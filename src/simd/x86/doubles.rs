@@ -1,4 +1,4 @@
-//! Eight doubles: one register of AVX-512, or two of AVX2.
+//! Eight doubles, one register of AVX-512 or two of AVX2, and four.
 
 #![allow(
     clippy::multiple_unsafe_ops_per_block,
@@ -13,9 +13,9 @@ use crate::simd::doubles::{Doubles, Halves, Quad};
 #[derive(Clone, Copy)]
 pub(super) struct D8(__m512d);
 
-/// In two registers of AVX2, likewise.
+/// In two registers of AVX2.
 #[derive(Clone, Copy)]
-pub(super) struct D44([__m256d; 2]);
+pub(super) struct D44([D4; 2]);
 
 impl D8 {
     /// # Safety
@@ -101,15 +101,14 @@ impl Halves for D8 {
     }
 }
 
-/// Operations of one instruction a half.
+/// Operations that are done half by half.
 macro_rules! in_halves {
-    ($($name:ident: $instruction:ident;)*) => {
+    ($($name:ident)*) => {
         $(
             #[inline(always)]
             fn $name(self, other: Self) -> Self {
                 let ([a, b], [c, d]) = (self.0, other.0);
-                // SAFETY: a value of this type proves AVX2.
-                D44(unsafe { [$instruction(a, c), $instruction(b, d)] })
+                D44([a.$name(c), b.$name(d)])
             }
         )*
     };
@@ -123,9 +122,7 @@ impl D44 {
     pub unsafe fn widened(floats: &[f32; 8]) -> Self {
         let first = floats.as_ptr();
         // SAFETY: the caller's promise; the array has eight floats.
-        D44(unsafe {
-            [_mm256_cvtps_pd(_mm_loadu_ps(first)), _mm256_cvtps_pd(_mm_loadu_ps(first.add(4)))]
-        })
+        D44(unsafe { [D4::from(first), D4::from(first.add(4))] })
     }
 
     /// # Safety
@@ -134,7 +131,7 @@ impl D44 {
     #[inline(always)]
     pub unsafe fn twice(four: &[f64; 4]) -> Self {
         // SAFETY: the caller's promise; the array has four doubles.
-        D44([unsafe { _mm256_loadu_pd(four.as_ptr()) }; 2])
+        D44([D4(unsafe { _mm256_loadu_pd(four.as_ptr()) }); 2])
     }
 
     #[inline(always)]
@@ -143,87 +140,73 @@ impl D44 {
         let first: *mut f32 = floats.as_mut_ptr();
         // SAFETY: a value of this type proves AVX2; the array has eight floats.
         unsafe {
-            _mm_storeu_ps(first, _mm256_cvtpd_ps(low));
-            _mm_storeu_ps(first.add(4), _mm256_cvtpd_ps(high));
+            _mm_storeu_ps(first, _mm256_cvtpd_ps(low.0));
+            _mm_storeu_ps(first.add(4), _mm256_cvtpd_ps(high.0));
         }
         floats
     }
 }
 
 impl Doubles for D44 {
-    in_halves! {
-        add: _mm256_add_pd;
-        sub: _mm256_sub_pd;
-        mul: _mm256_mul_pd;
-        div: _mm256_div_pd;
-    }
+    in_halves!(add sub mul div);
 
     #[inline(always)]
     fn times(self, factor: f64) -> Self {
         let [low, high] = self.0;
-        // SAFETY: a value of this type proves AVX2.
-        D44(unsafe {
-            let factor = _mm256_set1_pd(factor);
-            [_mm256_mul_pd(low, factor), _mm256_mul_pd(high, factor)]
-        })
+        D44([low.times(factor), high.times(factor)])
     }
 
     #[inline(always)]
     fn abs(self) -> Self {
         let [low, high] = self.0;
-        // SAFETY: as above.
-        D44(unsafe {
-            let sign = _mm256_set1_pd(-0.0);
-            [_mm256_andnot_pd(sign, low), _mm256_andnot_pd(sign, high)]
-        })
+        D44([low.abs(), high.abs()])
     }
 
     #[inline(always)]
     fn neg(self) -> Self {
         let [low, high] = self.0;
-        // SAFETY: as above.
-        D44(unsafe {
-            let sign = _mm256_set1_pd(-0.0);
-            [_mm256_xor_pd(sign, low), _mm256_xor_pd(sign, high)]
-        })
+        D44([low.neg(), high.neg()])
     }
 
     #[inline(always)]
     fn less(self, other: Self) -> u32 {
         let ([a, b], [c, d]) = (self.0, other.0);
-        // SAFETY: as above.
-        unsafe {
-            let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a, c));
-            (low | _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(b, d)) << 4) as u32
-        }
+        a.less(c) | b.less(d) << 4
     }
 }
 
 impl Halves for D44 {
     #[inline(always)]
     fn spread(self) -> [Self; 3] {
-        let [low, high] = self.0;
+        let [D4(low), D4(high)] = self.0;
         // SAFETY: a value of this type proves AVX2.
-        unsafe {
+        let [a, b, c, d, e, f] = unsafe {
             [
-                D44([_mm256_permute4x64_pd::<0x00>(low), _mm256_permute4x64_pd::<0x00>(high)]),
-                D44([_mm256_permute4x64_pd::<0x55>(low), _mm256_permute4x64_pd::<0x55>(high)]),
-                D44([_mm256_permute4x64_pd::<0xAA>(low), _mm256_permute4x64_pd::<0xAA>(high)]),
+                _mm256_permute4x64_pd::<0x00>(low),
+                _mm256_permute4x64_pd::<0x00>(high),
+                _mm256_permute4x64_pd::<0x55>(low),
+                _mm256_permute4x64_pd::<0x55>(high),
+                _mm256_permute4x64_pd::<0xAA>(low),
+                _mm256_permute4x64_pd::<0xAA>(high),
             ]
-        }
+        };
+        [D44([D4(a), D4(b)]), D44([D4(c), D4(d)]), D44([D4(e), D4(f)])]
     }
 
     #[inline(always)]
     fn beside(self, first: Self, second: f64) -> Self {
-        let ([low, high], [beside, _]) = (self.0, first.0);
+        let ([D4(low), D4(high)], [D4(beside), _]) = (self.0, first.0);
         // SAFETY: as above.
         D44(unsafe {
-            [_mm256_blend_pd::<8>(low, beside), _mm256_blend_pd::<8>(high, _mm256_set1_pd(second))]
+            [
+                D4(_mm256_blend_pd::<8>(low, beside)),
+                D4(_mm256_blend_pd::<8>(high, _mm256_set1_pd(second))),
+            ]
         })
     }
 }
 
-/// Four of them, in one register of AVX2, likewise.
+/// Four of them, in one register of AVX2: such a value is made from a token, so the instructions exist.
 #[derive(Clone, Copy)]
 pub(super) struct D4(__m256d);
 
@@ -234,7 +217,16 @@ impl D4 {
     #[inline(always)]
     pub unsafe fn widened(floats: &[f32; 4]) -> Self {
         // SAFETY: the caller's promise; the array has four floats.
-        D4(unsafe { _mm256_cvtps_pd(_mm_loadu_ps(floats.as_ptr())) })
+        unsafe { D4::from(floats.as_ptr()) }
+    }
+
+    /// # Safety
+    ///
+    /// The processor has AVX2; there are four floats.
+    #[inline(always)]
+    unsafe fn from(floats: *const f32) -> Self {
+        // SAFETY: the caller's promises.
+        D4(unsafe { _mm256_cvtps_pd(_mm_loadu_ps(floats)) })
     }
 }
 

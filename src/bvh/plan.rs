@@ -1,0 +1,111 @@
+//! What a wide tree is grown over: strips of primitives, or runs of these.
+
+use super::How;
+use super::bins::Effort;
+use super::budget::leaf_budget;
+use super::places::Places;
+use super::refs::{PrimRef, gather, refs_per_prim};
+use super::runs::put_into_runs;
+use super::split::Areas;
+use super::spread::unevenness_of_all;
+use crate::block::Census;
+use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
+use crate::prim::Source;
+use crate::scene::Scene;
+use crate::storage;
+
+/// Primitives of a leaf of the binary tree at most: any five triangles fit into a block.
+const LEAF_MAX: usize = TRIANGLES_AT_LEAST;
+const _: () = assert!(SPHERES >= LEAF_MAX);
+
+/// Strips of a leaf at most, of `strip` triangles each: such a strip has two vertices more than triangles. In an index
+/// every instance is a leaf.
+pub(super) fn leaf_max(census: &Census, strip: usize) -> usize {
+    match strip {
+        _ if census.is_index => 1,
+        1 => LEAF_MAX,
+        _ => TRIANGLES / (strip + 2),
+    }
+}
+
+/// What a tree is grown over, and where.
+pub(super) struct Plan {
+    pub places: Places,
+    /// Of refs, or of [runs](super::runs).
+    pub count: usize,
+    pub leaf_max: usize,
+    /// The effort where areas are uneven.
+    pub uneven: Option<Effort>,
+    /// Whether refs may be cut in two. Spheres are not, nor is what will move.
+    pub cut: bool,
+    pub in_runs: bool,
+}
+
+impl Plan {
+    /// Gathers refs at the front of `bytes`, and puts them into runs where that is wanted and goes.
+    pub fn new(
+        census: &Census,
+        places: Places,
+        how: &How,
+        source: Source,
+        bytes: &mut [u8],
+    ) -> Option<Plan> {
+        let (size, areas) = (places.refs + bytes.len(), Areas::new(&census.bounds));
+        let refs = storage::view_mut::<PrimRef>(bytes, 0, places.room)?;
+        let Gathered { count, strip, leaves } =
+            gather_strips(source.scene, census, places.leaves, how, refs);
+        let unevenness = unevenness_of_all(refs.get(..count)?, areas, how.caller);
+        let uneven = how.effort.for_uneven(unevenness);
+        let (prims, still) = (census.hittable(), census.sphere_count == 0 && !census.refit);
+        let cut = uneven.is_some_and(|effort| effort.cuts) && still;
+        if uneven.is_none() && how.effort.runs && census.triangle_count == prims {
+            let count = (count, prims as usize);
+            if let Some(places) = put_into_runs(count, &places, source, areas, bytes) {
+                let count = places.room;
+                return Some(Plan { places, count, leaf_max: 1, uneven, cut, in_runs: true });
+            }
+        }
+        let places = match uneven {
+            Some(_) => places.for_uneven(count, leaves, cut, size),
+            None => Places { leaves, ..places },
+        };
+        let leaf_max = leaf_max(census, strip);
+        Some(Plan { places, count, leaf_max, uneven, cut, in_runs: false })
+    }
+}
+
+/// So many refs, of as many as there would be at the least, and strips are not worth it.
+const FOLLOWED: f32 = 1.6;
+
+/// Refs of up to `strip` triangles, and the leaves that a tree over them may have.
+struct Gathered {
+    count: usize,
+    strip: usize,
+    leaves: usize,
+}
+
+/// Gathers refs of the longest strips for which there is room, which is `room` leaves.
+fn gather_strips(
+    scene: &Scene,
+    census: &Census,
+    room: usize,
+    how: &How,
+    refs: &mut [PrimRef],
+) -> Gathered {
+    let mixed = census.is_mixed();
+    let mut strip = if mixed || census.is_index { 1 } else { how.effort.strip };
+    // Where few triangles follow a neighbour, strips are but more leaves.
+    while strip > 1 && refs_per_prim(scene, census, strip, refs) > FOLLOWED / strip as f32 {
+        strip /= 2;
+    }
+    loop {
+        let count = gather(scene, census, strip, how.caller, refs);
+        let least = leaf_budget(count, mixed, leaf_max(census, strip), false);
+        // Where strips are shorter than they may be, there may be more leaves than room for them.
+        if least <= room || strip == 1 {
+            let leaves = room.min(count / 2).max(least);
+            return Gathered { count, strip, leaves };
+        }
+        strip /= 2;
+    }
+}
