@@ -103,7 +103,7 @@ fn closest_in(
     options: &QueryOptions,
 ) -> Option<Found> {
     let (choice, block) = (shown.choice(options), &shown.block.parts());
-    let filter = Filter::new(choice, block.geometries, block.prim_ids);
+    let filter = Filter::new(choice, block.whole);
     let leaves = Leaves::of(block);
     let mut nearest = Nearest::new(image, point, limit, block.header.reach, filter, leaves);
     search(block, &mut nearest);

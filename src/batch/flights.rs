@@ -61,7 +61,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
                     continue;
                 }
                 if let Turn::Ended(ended) = turn {
-                    self.write(*number, Q::answer(s, self.block, ray, query, ended));
+                    self.write(*number, Q::answer(s, self.block.whole, ray, query, ended));
                 } else {
                     self.answer_alone(*number);
                 }
@@ -86,7 +86,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
                 self.answer_alone(flight.number);
                 continue;
             };
-            let query = self.question.query(self.block, ray.t_max);
+            let query = self.question.query(self.block.whole, ray.t_max);
             walk.restart(query.t_bound());
             flight.query = Some(query);
             flight.slab = slab;

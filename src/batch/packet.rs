@@ -243,7 +243,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             rest &= rest - 1;
             let Some(given) = self.batch.rays.get(16 * group + lane) else { return };
             let Some(ray) = given.prepare(reach) else { continue };
-            let mut query = self.batch.question.query(self.batch.block, ray.t_max);
+            let mut query = self.batch.question.query(self.batch.block.whole, ray.t_max);
             if let Some(leaf) = self.leaf(group, lane) {
                 self.leaves.intersect(Scalar, leaf, &ray, &mut query);
             }
@@ -303,8 +303,8 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
     fn settle_alone(&mut self, number: usize, leaf: LeafRef) {
         let Batch { block, rays, question, .. } = self.batch;
         let Some(ray) = rays[number].prepare(block.header.reach) else { return };
-        let mut query = question.query(block, ray.t_max);
+        let mut query = question.query(block.whole, ray.t_max);
         let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
-        self.batch.write(number, Q::answer(Scalar, block, &ray, &mut query, ended));
+        self.batch.write(number, Q::answer(Scalar, block.whole, &ray, &mut query, ended));
     }
 }

@@ -45,7 +45,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
             let ended = rays & !stream.going;
             for lane in Bits(rays) {
                 if let Member { ray, query: Some(query), .. } = &mut members[lane % STREAM] {
-                    let answer = Q::answer(s, self.block, ray, query, ended >> lane & 1 == 1);
+                    let answer = Q::answer(s, self.block.whole, ray, query, ended >> lane & 1 == 1);
                     self.write(first + lane, answer);
                 }
             }
@@ -67,7 +67,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
                 self.answer_alone(first + lane);
                 continue;
             };
-            member.query = Some(self.question.query(self.block, ray.t_max));
+            member.query = Some(self.question.query(self.block.whole, ray.t_max));
             member.ray = ray;
             member.slab = slab;
             joined |= 1 << lane;

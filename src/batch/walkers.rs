@@ -155,7 +155,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>, S: Simd> Walkers<'_, 'm, 
     #[inline(always)]
     fn answer(&mut self, s: S, lane: usize, ended: bool) {
         if let Walker { number, ray, query: Some(query), .. } = &mut self.walkers[lane % 16] {
-            let answer = Q::answer(s, self.batch.block, ray, query, ended);
+            let answer = Q::answer(s, self.batch.block.whole, ray, query, ended);
             self.batch.write(*number, answer);
         }
     }
@@ -171,7 +171,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>, S: Simd> Walkers<'_, 'm, 
                 self.batch.answer_alone(number);
                 continue;
             };
-            let query = Some(self.batch.question.query(self.batch.block, ray.t_max));
+            let query = Some(self.batch.question.query(self.batch.block.whole, ray.t_max));
             let walker = &mut self.walkers[lane % 16];
             *walker = Walker { number, ray, slab, query, grids: 0 };
             match walker.arrive(s, &self.cells) {

@@ -135,15 +135,16 @@ impl<'m> Finished<'m> {
             let sphere_blocks = if BALLS { sphere_blocks } else { 0 };
             let mut at = At::new(block, size_of::<Header>());
             let (geometries, prim_ids) = (at.part(geometries), at.part(prim_ids));
-            let (grids, nodes) = (at.part(grids), at.part(nodes));
-            let bundles = match header.layout {
-                _ if !WIDE => Bundles::None,
-                4 => Bundles::Four(at.part(bundle_lanes / 4)),
-                8 => Bundles::Eight(at.part(bundle_lanes / 8)),
-                16 => Bundles::Sixteen(at.part(bundle_lanes / 16)),
-                _ => Bundles::None,
-            };
-            let (words, sphere_blocks) = (at.part(words), at.part(sphere_blocks));
+            // Either bundles or nodes and grids: see `has_one_structure`.
+            let (mut narrow, mut bundles) = ((&[][..], &[][..], &[][..]), Bundles::None);
+            match header.layout {
+                4 if WIDE => bundles = Bundles::Four(at.part(bundle_lanes / 4)),
+                8 if WIDE => bundles = Bundles::Eight(at.part(bundle_lanes / 8)),
+                16 if WIDE => bundles = Bundles::Sixteen(at.part(bundle_lanes / 16)),
+                _ => narrow = (at.part(grids), at.part(nodes), at.part(words)),
+            }
+            let (grids, nodes, words) = narrow;
+            let sphere_blocks = at.part(sphere_blocks);
             let (triangle_blocks, runs) = (at.part(triangle_blocks), at.part(runs));
             Block {
                 whole: self,
@@ -191,10 +192,23 @@ fn front(bytes: &[u8]) -> Result<(&Header, usize), OpenError> {
     let counts = &header.counts;
     let width = if header.layout == LAYOUT_COMPACT { u32::MAX } else { header.layout };
     let end = counts.offsets().ok_or(OpenError::Corrupt)?.end;
-    if (WIDE && counts.bundle_lanes % width.max(1) != 0) || counts.motions > 1 {
+    if !has_one_structure(header)
+        || (WIDE && counts.bundle_lanes % width.max(1) != 0)
+        || counts.motions > 1
+    {
         return Err(OpenError::Corrupt);
     }
     Ok((header, end))
+}
+
+/// Whether a block has the parts of one structure: bundles, or what else there is.
+#[inline]
+fn has_one_structure(header: &Header) -> bool {
+    let Counts { grids, nodes, words, bundle_lanes, .. } = header.counts;
+    match header.layout {
+        LAYOUT_COMPACT => bundle_lanes == 0,
+        _ => grids | nodes | words == 0,
+    }
 }
 
 /// Whether this build of the library reads what is in a block.

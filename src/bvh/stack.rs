@@ -27,7 +27,7 @@ impl<const ROOM: usize> Columns<ROOM> {
 /// Children to come back to, each with the `t` at which the ray enters it.
 ///
 /// All `refs` below `count` are written, and all of `near` too unless children were
-/// [pushed without](Self::push_refs). A push writes as many lanes as a vector has and then counts those that matter,
+/// [pushed without](Self::push_but_last). A push writes as many lanes as a vector has and then counts those that matter,
 /// so that it takes no branch. The columns are borrowed, so that what is left can stay in registers.
 pub(super) struct Stack<'m, const ROOM: usize> {
     near: &'m mut [MaybeUninit<f32>; ROOM],
@@ -80,20 +80,20 @@ impl<'m, const ROOM: usize> Stack<'m, ROOM> {
         Some(ChildRef(nearest))
     }
 
-    /// Pushes the children in the lanes of `mask`, in their order, without a word on where they are entered: they must
-    /// not be [culled](Self::cull). False when there is no room.
+    /// Pushes the children in the lanes of `mask`, in their order, but for the last, which it returns; without a word on
+    /// where they are entered: they must not be [culled](Self::cull). `None` when there is no room.
     #[inline(always)]
-    pub fn push_refs<S: Width<W>, const W: usize>(
+    pub fn push_but_last<S: Width<W>, const W: usize>(
         &mut self,
         s: S,
         mask: u32,
         refs: &[ChildRef; W],
-    ) -> bool {
-        let column = self.refs.get_mut(self.count..).and_then(|refs| refs.first_chunk_mut::<W>());
-        let Some(column) = column else { return false };
+    ) -> Option<ChildRef> {
+        let column = self.refs.get_mut(self.count..)?.first_chunk_mut::<W>()?;
         s.compress_words(mask, ChildRef::words(refs), column);
-        self.count += mask.count_ones() as usize;
-        true
+        // Its place is the last, where the next ones go; from the stack it would come only after what was written there.
+        self.count += mask.count_ones() as usize - 1;
+        refs.get(31 - mask.leading_zeros() as usize).copied()
     }
 
     /// Drops what the ray enters beyond `t_bound`.

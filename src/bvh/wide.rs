@@ -60,6 +60,45 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         self.go_on::<S, Q, W>(s, bundle, mask, near)
     }
 
+    /// Goes from the bundle at hand to what comes next; false if it does not.
+    #[inline(always)]
+    fn pass<S: Width<W> + Simd, Q: Query, const W: usize>(
+        &mut self,
+        s: S,
+        bundles: &[Bundle<W>],
+        leaves: &Leaves,
+        boxes: &impl WideBoxes<S, W>,
+        t_bounds: <S as Width<W>>::V,
+        query: &mut Q,
+    ) -> bool {
+        let Some(bundle) = bundles.get(self.at.bundle_number()) else { return false };
+        query.watch().step();
+        let goes_on = self.enter::<S, Q, W>(s, bundle, boxes, t_bounds);
+        fetch(s, bundles, leaves, self.later());
+        goes_on
+    }
+
+    /// Goes from the root to where the ray must be prepared; false if it never must.
+    #[inline(always)]
+    fn arrive<S: Width<W> + Simd, L: Late, Q: Query, const W: usize>(
+        &mut self,
+        s: S,
+        bundles: &[Bundle<W>],
+        leaves: &Leaves,
+        boxes: &impl WideBoxes<S, W>,
+        query: &mut Q,
+    ) -> bool {
+        let t_bounds = Width::<W>::splat(s, self.t_bound());
+        loop {
+            if !self.pass::<S, Q, W>(s, bundles, leaves, boxes, t_bounds, query) {
+                return false;
+            }
+            if L::SOON || self.at.is_leaf() {
+                return self.at != ChildRef::NONE;
+            }
+        }
+    }
+
     /// Goes from a bundle to the nearest of the children in the lanes of `mask`, and comes back to the others later; false
     /// when there is no room.
     #[inline(always)]
@@ -75,15 +114,14 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
             self.at = only.copied().unwrap_or_else(|| self.stack.pop());
             return true;
         }
-        if Q::ORDERED {
-            let nearest = self.stack.push_but_nearest(s, mask, near, &bundle.refs);
-            self.at = nearest.unwrap_or(ChildRef::NONE);
-            return nearest.is_some();
-        }
-        // Without a bound that moves, it does not matter where they are entered.
-        let pushed = self.stack.push_refs(s, mask, &bundle.refs);
-        self.at = self.stack.pop();
-        pushed
+        let next = if Q::ORDERED {
+            self.stack.push_but_nearest(s, mask, near, &bundle.refs)
+        } else {
+            // Without a bound that moves, it does not matter where they are entered.
+            self.stack.push_but_last(s, mask, &bundle.refs)
+        };
+        self.at = next.unwrap_or(ChildRef::NONE);
+        next.is_some()
     }
 
     /// Offers `query` a leaf and goes on to what comes next; true when it ended the search.
@@ -135,33 +173,24 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, L: Late, Q: Query, const W: usiz
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
-    let boxes = slab.wide::<S, W>(s);
+    let boxes = &slab.wide::<S, W>(s);
     let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
     let mut walk = Walk::new(&mut columns, query.t_bound());
+    // Many rays pass the whole scene by. What only the others need is no business of the loop behind, either.
+    if prepared.is_none() && !walk.arrive::<S, L, Q, W>(s, bundles, leaves, boxes, query) {
+        return false;
+    }
+    let ray = &*prepared.get_or_insert_with(|| late.prepare());
     loop {
         let t_bounds = Width::<W>::splat(s, walk.t_bound());
         while !walk.at().is_leaf() {
-            let Some(bundle) = bundles.get(walk.at().bundle_number()) else { return false };
-            query.watch().step();
-            if !walk.enter::<S, Q, W>(s, bundle, &boxes, t_bounds) {
+            if !walk.pass::<S, Q, W>(s, bundles, leaves, boxes, t_bounds, query) {
                 return false;
-            }
-            fetch(s, bundles, leaves, walk.later());
-            if L::SOON && prepared.is_none() {
-                // Many rays pass the whole scene by, so this is worth a question a bundle.
-                if walk.at() == ChildRef::NONE {
-                    return false;
-                }
-                *prepared = Some(late.prepare());
             }
         }
         if walk.at() == ChildRef::NONE {
             return false;
         }
-        if !L::SOON && prepared.is_none() {
-            *prepared = Some(late.prepare());
-        }
-        let Some(ray) = prepared.as_ref() else { return false };
         if walk.open(s, leaves, ray, query) {
             return true;
         }

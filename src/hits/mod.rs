@@ -157,21 +157,21 @@ impl<'m, 'h> Question<'m> for HitsAfter<'h> {
     /// How many.
     type Answer = usize;
 
-    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        let filter = Filter::new(self.choice, block.geometries, block.prim_ids);
+    fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query {
+        let filter = Filter::new(self.choice, block);
         NextHits::new(filter, block, self.after.as_ref(), t_max, self.hits)
     }
 
     fn answer<S: Simd>(
-        _: S,
-        block: &Block,
+        s: S,
+        block: Finished<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
         _: bool,
     ) -> Self::Answer {
         query.finish(ray, |met| {
             let t = Exact::t(ray, met, &mut ());
-            let hit = trace::record(block, met.place(), t, Exact::weights(met));
+            let hit = trace::record(s, block, met.place(), t, Exact::weights(met));
             Hit { u: if met.root() == 1 { LEAVES } else { hit.u }, ..hit }
         })
     }

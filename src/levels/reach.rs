@@ -141,7 +141,7 @@ impl<W: Watch> Kernel for Reaching<'_, '_, '_, W> {
         let (t_bound, t_scale) = (late.t_max, late.t_scale());
         let mut query =
             Reach { level, visit, t_bound, t_scale, near, visited: [NONE; MAILBOX], watch };
-        trace(s, block, (&late, &mut None), &slab, &mut query);
+        trace(s, block.whole, (&late, &mut None), &slab, &mut query);
         Some(())
     }
 }

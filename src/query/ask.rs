@@ -2,7 +2,6 @@
 
 use super::waiting::Waiting;
 use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
-use crate::block::leaf::TriangleBlock;
 use crate::ray::{Interval, PreparedRay};
 use crate::simd::SMALL;
 
@@ -12,7 +11,7 @@ use crate::simd::SMALL;
 pub(crate) struct Closest<'m, D: Decide, W, const MEMORY: usize> {
     filter: Filter<'m>,
     t_bound: f32,
-    waiting: [Waiting<'m>; WAITS],
+    waiting: [Waiting; WAITS],
     pub best: Option<D::Met>,
     memory: [D::Memory; MEMORY],
     pub watch: W,
@@ -23,9 +22,9 @@ const WAITS: usize = if SMALL { 0 } else { 1 };
 
 impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     #[inline(always)]
-    pub fn new(filter: Filter<'m>, blocks: &'m [TriangleBlock], t_max: f32, watch: W) -> Self {
+    pub fn new(filter: Filter<'m>, t_max: f32, watch: W) -> Self {
         Closest {
-            waiting: core::array::from_fn(|_| Waiting::new(blocks, &filter, t_max)),
+            waiting: core::array::from_fn(|_| Waiting::new(&filter, t_max)),
             filter,
             t_bound: t_max,
             best: None,
@@ -37,13 +36,15 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
     /// The triangle of which the rest waits until the end.
     #[inline(always)]
     pub fn waiting(&self) -> Option<TriangleLane<'m>> {
-        self.waiting.first()?.lane()
+        self.waiting.first()?.lane(|| self.filter.block.parts().triangle_blocks)
     }
 
     /// Computes what waits. Nothing else was met then.
     #[inline(always)]
     pub fn settle(&mut self, ray: &PreparedRay) {
-        if let Some(lane) = self.waiting.first_mut().and_then(Waiting::end)
+        let block = self.filter.block;
+        let ended = |waiting: &mut Waiting| waiting.end(|| block.parts().triangle_blocks);
+        if let Some(lane) = self.waiting.first_mut().and_then(ended)
             && let Some((met, in_doubt)) = &D::likely(ray, &lane, &mut self.watch)
         {
             self.consider(ray, met, *in_doubt);
@@ -64,7 +65,7 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Closest<'m, D, W, MEMORY> {
         if let Some(best) = &self.best {
             // The grid offers a primitive once for each cell that holds it.
             let known = met.place() == best.place() && met.root() == best.root();
-            let (prim_ids, memory) = (self.filter.prim_ids, self.memory.first_mut());
+            let (prim_ids, memory) = (self.filter.prim_ids(), self.memory.first_mut());
             if known || !D::is_before(ray, met, best, prim_ids, memory, &mut self.watch) {
                 return;
             }
@@ -104,7 +105,7 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         // What was offered once is not computed again.
         let known = match &self.best {
             Some(best) => {
-                best.place() == lane.place || D::is_surely_after(lane, best, self.filter.prim_ids)
+                best.place() == lane.place || D::is_surely_after(lane, best, self.filter.prim_ids())
             }
             None => false,
         };

@@ -3,8 +3,8 @@
 use core::cmp::Ordering;
 
 use super::{Decide, Exact, ExactMet, Filter, Meets, Query, SphereLane, TriangleLane};
-use crate::block::Block;
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, Place, SphereBlock, TriangleBlock};
+use crate::block::{Block, Finished};
 use crate::math::rounding::{f32_above, f32_below};
 use crate::ray::{Hit, PreparedRay};
 
@@ -58,13 +58,13 @@ impl<'m, 'h> NextHits<'m, 'h> {
     /// Those after `after`, if that is given, into `room`.
     pub fn new(
         filter: Filter<'m>,
-        block: &Block<'m>,
+        block: Finished<'m>,
         after: Option<&ExactMet>,
         t_max: f32,
         room: &'h mut [Hit],
     ) -> Self {
-        let Block { triangle_blocks, sphere_blocks, .. } = *block;
-        let after = after.map(|met| keep(met, met.place().prim(filter.prim_ids), false));
+        let Block { triangle_blocks, sphere_blocks, .. } = block.parts();
+        let after = after.map(|met| keep(met, met.place().prim(filter.prim_ids()), false));
         NextHits {
             filter,
             triangle_blocks,
@@ -92,7 +92,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
         if !self.filter.faces(met.front()) {
             return;
         }
-        let number = met.place().prim(self.filter.prim_ids);
+        let number = met.place().prim(self.filter.prim_ids());
         let order = |kept: &Hit| self.compare(ray, (met, number), kept);
         if self.after.as_ref().is_some_and(|after| order(after) != Ordering::Greater) {
             return;
@@ -140,7 +140,7 @@ impl<'m, 'h> NextHits<'m, 'h> {
         }
         // Only in blocks of foreign bytes something is not met again. As what comes before it is not given, lists end.
         let Some(other) = self.meet_again(ray, kept) else { return Ordering::Less };
-        match Exact::is_before(ray, met, &other, self.filter.prim_ids, None, &mut ()) {
+        match Exact::is_before(ray, met, &other, self.filter.prim_ids(), None, &mut ()) {
             true => Ordering::Less,
             false => Ordering::Greater,
         }

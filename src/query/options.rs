@@ -1,12 +1,13 @@
 //! What one query may leave out, and how right it must be.
 
-use crate::block::Geometry;
 use crate::block::leaf::Place;
+use crate::block::{Finished, Geometry};
 use crate::ray::NONE;
 use crate::simd::prefetch;
 
 /// Which of two sides of a surface a ray may meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
 pub enum Facing {
     /// Both sides.
     #[default]
@@ -71,6 +72,7 @@ pub struct QueryOptions {
 
 /// What a query leaves out, in flat numbers.
 #[derive(Clone, Copy)]
+#[repr(C)]
 pub(crate) struct Choice {
     mask: u32,
     facing: Facing,
@@ -84,7 +86,8 @@ impl Choice {
     /// Whether nothing is left out.
     #[inline(always)]
     pub fn sees_all(&self) -> bool {
-        self.mask == 0 && self.skip == NONE && self.facing == Facing::Both
+        // In one number, as each ray asks.
+        self.mask | !self.skip | self.facing as u32 == 0
     }
 
     /// What `options` leave of the primitives with these geometries in an instance, or outside instances ([`NONE`]).
@@ -105,21 +108,27 @@ impl Choice {
 /// A choice among the primitives of a block.
 #[derive(Clone, Copy)]
 pub(crate) struct Filter<'m> {
-    geometries: &'m [Geometry],
-    pub prim_ids: &'m [u32],
+    /// Its parts are found when they are asked for, which is rare.
+    pub block: Finished<'m>,
     choice: Choice,
 }
 
 impl<'m> Filter<'m> {
     #[inline(always)]
-    pub fn new(choice: Choice, geometries: &'m [Geometry], prim_ids: &'m [u32]) -> Self {
-        Filter { geometries, prim_ids, choice }
+    pub fn new(choice: Choice, block: Finished<'m>) -> Self {
+        Filter { block, choice }
+    }
+
+    /// What the primitives of the block are called.
+    #[inline(always)]
+    pub fn prim_ids(&self) -> &'m [u32] {
+        self.block.parts().prim_ids
     }
 
     /// Whether every meeting counts.
     #[inline(always)]
     pub fn sees_all(&self) -> bool {
-        self.choice.mask == 0 && self.choice.skip == NONE && self.both_sides()
+        self.choice.sees_all()
     }
 
     /// Whether a meeting with the primitive stored there counts; only those that are `skippable` are
@@ -127,7 +136,7 @@ impl<'m> Filter<'m> {
     #[inline(always)]
     pub fn sees(&self, place: Place, skippable: bool) -> bool {
         let sees_all = self.choice.mask == 0 && (self.choice.skip == NONE || !skippable);
-        sees_all || self.sees_prim(place.prim(self.prim_ids), skippable)
+        sees_all || self.sees_prim(place.prim(self.prim_ids()), skippable)
     }
 
     #[inline(never)]
@@ -138,7 +147,7 @@ impl<'m> Filter<'m> {
     /// Has the number of the primitive stored there fetched: it is far away, and asked for last.
     #[inline(always)]
     pub fn fetch(&self, place: Place) {
-        if let Some(number) = self.prim_ids.get(place.entry as usize) {
+        if let Some(number) = self.prim_ids().get(place.entry as usize) {
             prefetch(number);
         }
     }
@@ -160,7 +169,7 @@ impl<'m> Filter<'m> {
     }
 
     fn mask_sees(&self, prim: u32) -> bool {
-        let mask = geometry_of(prim, self.geometries).map_or(0, |(_, g)| g.mask);
+        let mask = geometry_of(prim, self.block.parts().geometries).map_or(0, |(_, g)| g.mask);
         shares_bit(mask, self.choice.mask)
     }
 }

@@ -8,8 +8,7 @@ use crate::ray::{Interval, PreparedRay};
 /// ends, or when something else is met that may come first.
 ///
 /// Most rays that hit anything compute one `t` so, and no node waits for it.
-pub(super) struct Waiting<'m> {
-    blocks: &'m [TriangleBlock],
+pub(super) struct Waiting {
     /// The number of its block; [`NOBODY`], which no block has, if nothing waits.
     block: u32,
     lane: u32,
@@ -19,12 +18,12 @@ pub(super) struct Waiting<'m> {
 
 const NOBODY: u32 = u32::MAX;
 
-impl<'m> Waiting<'m> {
+impl Waiting {
     /// Nothing, and nothing ever if the filter asks more of a triangle than that it is met.
     #[inline(always)]
-    pub fn new(blocks: &'m [TriangleBlock], filter: &Filter, t_max: f32) -> Self {
+    pub fn new(filter: &Filter, t_max: f32) -> Self {
         let first_before = if filter.sees_all() { t_max } else { f32::NEG_INFINITY };
-        Waiting { blocks, block: NOBODY, lane: 0, first_before }
+        Waiting { block: NOBODY, lane: 0, first_before }
     }
 
     /// Takes the triangle in this lane, which the ray surely meets in this part of itself, if that comes first and is within the
@@ -35,23 +34,32 @@ impl<'m> Waiting<'m> {
     pub fn takes(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
         let first = ray.t_min < part.near && part.far < self.first_before;
         if first {
-            *self = Waiting { blocks: self.blocks, block, lane, first_before: part.near };
+            *self = Waiting { block, lane, first_before: part.near };
         }
         first
     }
 
-    /// The one that waits.
+    /// The one that waits, of the blocks that this was made for.
     #[inline(always)]
-    pub fn lane(&self) -> Option<TriangleLane<'m>> {
-        let block = self.blocks.get(self.block as usize)?;
+    pub fn lane<'m>(
+        &self,
+        blocks: impl FnOnce() -> &'m [TriangleBlock],
+    ) -> Option<TriangleLane<'m>> {
+        if self.block == NOBODY {
+            return None;
+        }
+        let block = blocks().get(self.block as usize)?;
         let place = Place::of_lane(self.block, block.first, self.lane);
         Some(TriangleLane { block, place, sure: true, inside: true })
     }
 
     /// The same, which waits no longer; nor does any that comes after it.
     #[inline(always)]
-    pub fn end(&mut self) -> Option<TriangleLane<'m>> {
-        let lane = self.lane();
+    pub fn end<'m>(
+        &mut self,
+        blocks: impl FnOnce() -> &'m [TriangleBlock],
+    ) -> Option<TriangleLane<'m>> {
+        let lane = self.lane(blocks);
         (self.block, self.first_before) = (NOBODY, f32::NEG_INFINITY);
         lane
     }

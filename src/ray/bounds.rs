@@ -59,8 +59,8 @@ fn see_walls(random: &mut Random, ray: &PreparedRay, reach: f32, worst: &mut Wor
         return true;
     }
     let product = wall * slab.reciprocal[k];
-    let (near, far) = (product - slab.near_shift[k], product - slab.far_shift[k]);
-    let pad = (f64::from(slab.near_shift[k]) - f64::from(slab.far_shift[k])) / 2.0;
+    let (near, far) = (product + slab.near_shift[k], product + slab.far_shift[k]);
+    let pad = (f64::from(slab.far_shift[k]) - f64::from(slab.near_shift[k])) / 2.0;
     worst.see(f64::from(near) + pad - real, pad);
     worst.see(f64::from(far) - pad - real, pad);
     f64::from(near) <= real && real <= f64::from(far)

@@ -1,8 +1,8 @@
 //! Powers of two that bring rays into their frames, and limits that are rounded on the way.
 
 use crate::math::float::narrow_power_of_two;
-use crate::math::rounding::{Round, f32_above, f32_below, scaled_by};
-use crate::simd::SMALL;
+use crate::math::rounding::{Round, scaled_by};
+use crate::simd::{Lanes, SMALL, Simd, Width};
 
 /// Ordinary scenes, origins and directions are smaller than this, and not all smaller than its reciprocal.
 pub(super) const ORDINARY: f32 = (1u64 << 60) as f32;
@@ -15,16 +15,30 @@ pub(super) fn is_ordinary(x: f32) -> bool {
 /// That of infinity, and of NaN.
 pub(super) const EXPONENT: u32 = f32::INFINITY.to_bits();
 
-/// `2^n` by the bits of a float: its exponent.
-#[inline(always)]
-pub(super) fn exponent_bits(x: f32) -> u32 {
-    x.to_bits() & EXPONENT
-}
-
 /// The power of two that brings an ordinary number, and all that are not larger, below 1.
 #[inline(always)]
 pub(super) fn scale_below(x: f32) -> f32 {
-    f32::from_bits((253 << 23) - exponent_bits(x))
+    f32::from_bits((253 << 23) - (x.to_bits() & EXPONENT))
+}
+
+/// In each lane the power of two that an ordinary number is not below, and below twice of.
+#[inline(always)]
+pub(super) fn powers<S: Simd>(s: S, v: <S as Width<4>>::V) -> <S as Width<4>>::V {
+    by_bits(s, v, |bits| bits & EXPONENT)
+}
+
+/// In each lane the reciprocal of a power of two, by its exponent.
+#[inline(always)]
+pub(super) fn reciprocals<S: Simd>(s: S, powers: <S as Width<4>>::V) -> <S as Width<4>>::V {
+    by_bits(s, powers, |bits| (254u32 << 23).wrapping_sub(bits))
+}
+
+/// What compilers make one instruction of.
+#[inline(always)]
+fn by_bits<S: Simd>(s: S, v: <S as Width<4>>::V, f: impl Fn(u32) -> u32) -> <S as Width<4>>::V {
+    let mut lanes = [0.0; 4];
+    v.store(&mut lanes);
+    Width::<4>::load(s, &lanes.map(|x| f32::from_bits(f(x.to_bits()))))
 }
 
 /// The bits of the largest absolute value: floats without a sign are in the order of their bits, with
@@ -46,26 +60,6 @@ fn scaled(t: f32, scale: f32) -> Option<f32> {
     (product.abs() >= f32::MIN_POSITIVE || t == 0.0).then_some(product)
 }
 
-/// The largest float that is not above `t * scale`.
-#[inline(always)]
-pub(super) fn below(t: f32, scale: f32) -> f32 {
-    match scaled(t, scale) {
-        Some(product) if product > f32::MAX => f32::MAX,
-        Some(product) => product,
-        None => rarely(f32_below, t, scale),
-    }
-}
-
-/// The smallest float that is not below `t * scale`.
-#[inline(always)]
-pub(super) fn above(t: f32, scale: f32) -> f32 {
-    match scaled(t, scale) {
-        Some(product) if product < -f32::MAX => -f32::MAX,
-        Some(product) => product,
-        None => rarely(f32_above, t, scale),
-    }
-}
-
 /// `t * 2^n` of a finite `t`, which is a float unless it is not a normal one. Out of line, and without `f64`.
 #[cfg_attr(target_os = "none", inline(always))]
 #[cfg_attr(not(target_os = "none"), inline(never))]
@@ -76,10 +70,4 @@ pub(super) fn rounded(t: f32, n: i32, round: Round) -> f32 {
         Some(product) if product.abs() <= f32::MAX => product,
         _ => scaled_by(t, n, round),
     }
-}
-
-#[cold]
-#[inline(never)]
-fn rarely(round: fn(f64) -> f32, t: f32, scale: f32) -> f32 {
-    round(f64::from(t) * f64::from(scale))
 }

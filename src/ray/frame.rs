@@ -1,7 +1,7 @@
 //! A ray in a frame of its own, in which `f32` neither over- nor underflows.
 
 use super::exponents::rounded;
-use super::{Axis, Ray};
+use super::{Axis, Rows};
 use crate::exact::Line;
 use crate::math::rounding::{Round, UNIT32, f32_above};
 
@@ -15,7 +15,7 @@ use crate::math::rounding::{Round, UNIT32, f32_above};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PreparedRay {
     /// The ray as it was given.
-    pub given: Ray,
+    pub given: Rows,
     /// From given coordinates to the frame's: a power of two between 2^-126 and 2^126.
     pub scale: f32,
     /// The fourth lane of these two means nothing: four are one vector on most machines.
@@ -84,10 +84,11 @@ impl Shear {
 pub(super) const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
 
 impl Shear {
-    /// For numbers of a prepared ray.
+    /// For numbers of a prepared ray. `pace` is the reciprocal of the direction's size along `depth`.
     #[inline(always)]
     pub fn new(
         depth: Axis,
+        pace: f32,
         origin: &[f32; 4],
         direction: &[f32; 4],
         scale: f32,
@@ -96,8 +97,7 @@ impl Shear {
         let axes = depth.as_depth();
         let [kx, ky, depth] = axes.map(|axis| axis as usize);
         let depth_rate = direction[depth].abs();
-        let inverse = 1.0 / depth_rate;
-        let slope = [direction[kx] * inverse, direction[ky] * inverse];
+        let slope = [direction[kx] * pace, direction[ky] * pace];
         let [a, b] = [slope[0].abs(), slope[1].abs()];
         let sign = direction[depth].to_bits() & 1 << 31;
         let signed = |x: f32| f32::from_bits(x.to_bits() ^ sign);
@@ -109,7 +109,7 @@ impl Shear {
             depth_scale: signed(scale),
             origin_depth: signed(origin[depth]),
             depth_rate,
-            pace: inverse,
+            pace,
             low: low - depth_slack(low),
         }
     }
@@ -118,7 +118,7 @@ impl Shear {
 impl PreparedRay {
     /// Nothing in particular.
     pub const BLANK: Self = PreparedRay {
-        given: Ray::new([0.0; 3], [0.0; 3]),
+        given: Rows([[0.0; 4]; 2]),
         scale: 0.0,
         origin: [0.0; 4],
         direction: [0.0; 4],

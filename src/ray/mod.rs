@@ -1,5 +1,9 @@
 //! Rays, hits, and what a traversal knows about a ray before it starts.
 
+use core::ops::Deref;
+
+use crate::simd::{Lanes, Simd, Width};
+
 mod abreast;
 mod alike;
 mod axis;
@@ -81,6 +85,22 @@ impl Ray {
     }
 }
 
+/// A ray that is kept as its halves: what is written by parts is slow to read as a whole.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Rows(pub [[f32; 4]; 2]);
+
+impl Deref for Rows {
+    type Target = Ray;
+
+    #[allow(unsafe_code, reason = "a promise about the layout drawn above")]
+    #[inline(always)]
+    fn deref(&self) -> &Ray {
+        // SAFETY: eight floats, as for `row`.
+        unsafe { &*core::ptr::from_ref(self).cast() }
+    }
+}
+
 /// Where a ray meets a scene.
 ///
 /// ```text
@@ -106,6 +126,20 @@ pub struct Hit {
 const _: () = assert!(size_of::<Hit>() == 24);
 
 impl Hit {
+    /// A hit that is written at once: what is written by parts is slow to copy.
+    #[allow(unsafe_code, reason = "a promise about the layout drawn above")]
+    #[inline(always)]
+    pub(crate) fn of_whole(s: impl Simd, Hit { t, u, v, prim, geometry, instance }: Hit) -> Self {
+        #[repr(C)]
+        struct Whole([f32; 4], [u8; 8]);
+        let mut first = [0.0; 4];
+        Width::<4>::load(s, &[t, u, v, f32::from_bits(prim)]).store(&mut first);
+        let [a, b, c, d] = geometry.to_ne_bytes();
+        let [e, f, g, h] = instance.to_ne_bytes();
+        // SAFETY: any bits are a hit, and these are its 24 bytes in their order.
+        unsafe { core::mem::transmute(Whole(first, [a, b, c, d, e, f, g, h])) }
+    }
+
     /// What the C entry points write for a ray that hits nothing.
     pub const MISS: Hit =
         Hit { t: f32::INFINITY, u: 0.0, v: 0.0, prim: NONE, geometry: NONE, instance: NONE };

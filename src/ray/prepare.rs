@@ -1,12 +1,11 @@
 //! From a ray as it is given to one that is prepared, in two steps: boxes can be tested before primitives.
 
 use super::exponents::{
-    EXPONENT, ORDINARY, above, below, exponent_above, exponent_bits, is_ordinary, largest_bits,
-    rounded, scale_below,
+    EXPONENT, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded,
 };
-use super::frame::{PreparedRay, SLOWEST, Shear};
+use super::frame::{PreparedRay, SLOWEST, Shear, TINY};
 use super::slab::{NarrowSlab, Scales};
-use super::{Axis, Ray};
+use super::{Axis, Ray, Rows};
 use crate::exact::Line;
 use crate::math::float::{narrow_power_of_two, power_of_two};
 use crate::math::rounding::Round;
@@ -19,12 +18,16 @@ impl Ray {
         Line { origin: self.origin, direction: self.direction }
     }
 
-    /// The limits, with the largest floats for what is beyond.
+    /// The lower limit: the largest float for what is beyond.
     #[inline(always)]
-    fn finite_limits(&self) -> [f32; 2] {
-        let t_min = if self.t_min < -f32::MAX { -f32::MAX } else { self.t_min };
-        let t_max = if self.t_max > f32::MAX { f32::MAX } else { self.t_max };
-        [t_min, t_max]
+    fn least(&self) -> f32 {
+        if self.t_min < -f32::MAX { -f32::MAX } else { self.t_min }
+    }
+
+    /// The upper limit, likewise.
+    #[inline(always)]
+    fn most(&self) -> f32 {
+        if self.t_max > f32::MAX { f32::MAX } else { self.t_max }
     }
 
     /// What boxes need of an ordinary ray, and what the rest follows from. `None` for a ray that hits nothing by
@@ -32,48 +35,35 @@ impl Ray {
     /// infinite if it is not representable.
     ///
     /// What all rays wait for is the way from the largest component over the reciprocals to the first boxes; so
-    /// division does not wait for the frame, and both meet behind it.
+    /// division does not wait for the frame, and both meet behind it. All is done in vectors, also what is one number, and
+    /// all doubts are one question: every ray comes here, and many only to find that it hits nothing.
     #[inline(always)]
     pub(crate) fn set_out<S: Simd>(&self, s: S, reach: f32) -> Option<(LateRay<S>, NarrowSlab)> {
         let splat = |x: f32| Width::<4>::splat(s, x);
-        let [from, along] = self.rows();
+        let given = Ray { t_min: self.least(), t_max: self.most(), ..*self };
+        let [from, along] = given.rows();
         let (o, d) = (Width::<4>::load(s, &from), Width::<4>::load(s, &along));
         let (distance, speed) = (o.abs(), d.abs());
         let fastest = s.largest_of_three(speed);
-        let inverse = splat(1.0).div(speed.max(fastest.mul(splat(SLOWEST))));
-        let depth = match fastest.less_or_equal(speed) & 7 {
-            4.. => Axis::Z,
-            2.. => Axis::Y,
-            _ => Axis::X,
-        };
-        let [fastest, ..] = array::<S>(fastest);
-        let [farthest, ..] = array::<S>(s.largest_of_three(distance));
-        let reach = if farthest > reach { farthest } else { reach };
-        let [t_min, t_max] = self.finite_limits();
+        let most = splat(ORDINARY);
+        // Not the reciprocal of a limit, which may be a subnormal number: that takes some processors very long.
+        let inverse = splat(1.0).div(speed.min(most).max(fastest.mul(splat(SLOWEST))));
+        let reach = s.largest_of_three(distance).max(splat(reach));
         // These comparisons refuse a NaN, which may have been lost above.
-        let within = splat(ORDINARY);
-        let finite = distance.less(within) & speed.less(within) & 7 == 7 && t_min <= t_max;
-        if !(finite && is_ordinary(fastest) && is_ordinary(reach)) {
+        let least = splat(1.0 / ORDINARY).less_or_equal(fastest.min(reach));
+        let sound = distance.less(most) & speed.less(most) & reach.less(most) & least;
+        if !(sound & 7 == 7 && given.t_min <= given.t_max) {
             return None;
         }
-        // 2^e above all coordinates and 2^l below the fastest component: by exponents, whose zero is 127.
-        let (e, l) = (exponent_bits(reach), exponent_bits(fastest));
-        let scale = scale_below(reach);
-        let t_scale = f32::from_bits((126 << 23) + l - e);
-        let (t_min_below, t_max_above) = (below(t_min, t_scale), above(t_max, t_scale));
-        let scales = Scales { t: t_scale, space: scale };
-        let backwards = self.direction.map(f32::is_sign_negative);
-        let slab = NarrowSlab::new(s, [o, d, inverse], scales, reach, t_min_below, backwards);
-        let ray = LateRay {
-            given: Ray { t_min, t_max, ..*self },
-            origin: o.mul(splat(scale)),
-            direction: d.mul(splat(f32::from_bits((254 << 23) - l))),
-            scales,
-            t_min: t_min_below,
-            t_max: t_max_above,
-            depth,
-        };
-        Some((ray, slab))
+        // 2^-e with 2^e above all coordinates, and 2^l below the fastest component.
+        let space = reciprocals(s, powers(s, reach)).mul(splat(0.5));
+        let length = powers(s, fastest);
+        let scales = Scales { t: length.mul(space), space, reach };
+        let [t_scale, ..] = array::<S>(scales.t);
+        let [t_min, t_max] = framed([given.t_min * t_scale, given.t_max * t_scale]);
+        let slab = NarrowSlab::new(s, [o, d, inverse], &scales, t_min);
+        let fastest = fastest.less_or_equal(speed);
+        Some((LateRay { s, o, d, inverse, space, length, t_scale, t_min, t_max, fastest }, slab))
     }
 
     /// The same with all that traversal needs.
@@ -113,7 +103,7 @@ impl Ray {
     #[inline(never)]
     pub(crate) fn prepare_any(&self, reach: f32) -> Option<PreparedRay> {
         let (farthest, longest) = (largest_bits(&self.origin), largest_bits(&self.direction));
-        let [t_min, t_max] = self.finite_limits();
+        let (t_min, t_max) = (self.least(), self.most());
         let finite = farthest < EXPONENT && longest < EXPONENT;
         if !(finite && longest > 0 && t_min <= t_max) {
             return None;
@@ -132,37 +122,64 @@ impl Ray {
             direction[k] = self.direction[k] * up * down;
         }
         let depth = self.depth_axis(longest);
+        let pace = 1.0 / direction[depth as usize].abs();
         let t_exponent = length - lift - exponent;
-        let t_min_below = rounded(t_min, t_exponent, Round::Below);
+        let below = rounded(t_min, t_exponent, Round::Below);
+        let above = rounded(t_max, t_exponent, Round::Above);
+        let [below, above] = framed([below, above]);
         Some(PreparedRay {
-            given: Ray { t_min, t_max, ..*self },
+            given: Rows(Ray { t_min, t_max, ..*self }.rows()),
             scale,
             origin,
             direction,
             t_scale: power_of_two(t_exponent),
-            t_min: t_min_below,
-            t_max: rounded(t_max, t_exponent, Round::Above),
-            shear: Shear::new(depth, &origin, &direction, scale, t_min_below),
+            t_min: below,
+            t_max: above,
+            shear: Shear::new(depth, pace, &origin, &direction, scale, below),
         })
     }
 }
 
+/// Limits in the frame, from such that are off by no more than underflow takes away, if it is to zero.
+#[inline(always)]
+fn framed([t_min, t_max]: [f32; 2]) -> [f32; 2] {
+    [t_min - TINY, t_max + TINY]
+}
+
 /// An ordinary ray. Until it is prepared only boxes can be tested, which is all that rays beside the scene need.
 pub(crate) struct LateRay<S: Simd> {
-    given: Ray,
-    origin: <S as Width<4>>::V,
-    direction: <S as Width<4>>::V,
-    scales: Scales,
+    s: S,
+    /// Origin and direction as they were given, each with a limit behind it.
+    o: <S as Width<4>>::V,
+    d: <S as Width<4>>::V,
+    /// The reciprocals of the sizes of the direction's components.
+    inverse: <S as Width<4>>::V,
+    /// From given coordinates to the frame's.
+    space: <S as Width<4>>::V,
+    /// The length of the direction by which it is scaled, a power of two.
+    length: <S as Width<4>>::V,
+    t_scale: f32,
     t_min: f32,
     pub t_max: f32,
-    depth: Axis,
+    /// The lanes with the largest component of the direction.
+    fastest: u32,
 }
 
 impl<S: Simd> LateRay<S> {
     /// From given `t` to the frame's, a power of two.
     #[inline(always)]
     pub fn t_scale(&self) -> f64 {
-        f64::from(self.scales.t)
+        f64::from(self.t_scale)
+    }
+
+    /// The axis of the largest component of the direction, the last of equal ones.
+    #[inline(always)]
+    fn depth(&self) -> Axis {
+        match self.fastest & 7 {
+            4.. => Axis::Z,
+            2.. => Axis::Y,
+            _ => Axis::X,
+        }
     }
 }
 
@@ -191,17 +208,20 @@ impl<L: Late> Late for Passing<L> {
 impl<S: Simd> Late for LateRay<S> {
     #[inline(always)]
     fn prepare(&self) -> PreparedRay {
-        let LateRay { given, scales: Scales { t, space }, t_min, t_max, depth, .. } = *self;
-        let (origin, direction) = (array::<S>(self.origin), array::<S>(self.direction));
+        let LateRay { s, o, d, inverse, space, length, t_min, t_max, .. } = *self;
+        let origin = array::<S>(o.mul(space));
+        let direction = array::<S>(d.mul(reciprocals(s, length)));
+        let (depth, [scale, ..]) = (self.depth(), array::<S>(space));
+        let pace = array::<S>(inverse.mul(length))[depth as usize];
         PreparedRay {
-            given,
-            scale: space,
+            given: Rows([array::<S>(o), array::<S>(d)]),
+            scale,
             origin,
             direction,
-            t_scale: f64::from(t),
+            t_scale: self.t_scale(),
             t_min,
             t_max,
-            shear: Shear::new(depth, &origin, &direction, space, t_min),
+            shear: Shear::new(depth, pace, &origin, &direction, scale, t_min),
         }
     }
 }
@@ -273,7 +293,7 @@ mod tests {
                     // The same point from both descriptions.
                     let given = f64::from(length) * f64::from(ray.scale);
                     assert_eq!(given, f64::from(ray.direction[0]) * ray.t_scale);
-                    assert_eq!(ray.t_min, 0.0);
+                    assert!((-TINY..=0.0).contains(&ray.t_min));
                 }
             }
         }

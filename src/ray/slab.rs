@@ -8,7 +8,7 @@ use super::{Interval, PreparedRay};
 use crate::math::float::less;
 use crate::math::rounding::{UNIT32, f32_above, f32_below, gamma};
 use crate::math::{Aabb, wide};
-use crate::simd::{Lanes, SMALL, Scalar, Simd, Width, mul_sub};
+use crate::simd::{Lanes, SMALL, Scalar, Simd, Width, mul_add};
 
 /// A ray made ready for boxes.
 ///
@@ -40,16 +40,15 @@ pub(crate) trait WideBoxes<S: Width<N>, const N: usize> {
 
 /// Boxes in `f32`, for ordinary rays.
 ///
-/// With `r` the scaled reciprocal of a component, the distance to a wall is `wall * r - shift`, where
-/// `shift` holds `origin * r` and all that rounding may add. `docs/METHODS.md` derives the padding.
+/// With `r` the scaled reciprocal of a component, the distance to a wall is `wall * r + shift`, where
+/// `shift` holds `-origin * r` and all that rounding may add. `docs/METHODS.md` derives the padding.
 #[derive(Clone, Copy)]
 pub(crate) struct NarrowSlab {
+    /// Each with the sign bit of the direction, by which the ray runs from the lower wall to the upper one or back.
     pub(super) reciprocal: [f32; 4],
     pub(super) near_shift: [f32; 4],
     pub(super) far_shift: [f32; 4],
     pub(super) t_min: f32,
-    /// Whether the ray runs from the upper wall to the lower one, for each axis.
-    pub(super) backwards: [bool; 3],
 }
 
 /// The padding of walls: of the origin's coordinate, of the reach in the direction's length, and of the reach.
@@ -57,39 +56,34 @@ pub(super) const RELATIVE_PAD: f32 = 6.0 * UNIT32;
 pub(super) const NEGLIGIBLE: f32 = 1.0 / (1u64 << 57) as f32;
 pub(super) const CONSTANT_PAD: f32 = 12.0 * UNIT32;
 
-/// From given numbers to the frame's: powers of two.
+/// From given numbers to the frame's, powers of two, and what is to be brought there; the same in each lane.
 #[derive(Clone, Copy)]
-pub(super) struct Scales {
+pub(super) struct Scales<V> {
     /// Of `t`.
-    pub t: f32,
+    pub t: V,
     /// Of coordinates.
-    pub space: f32,
+    pub space: V,
+    /// The largest coordinate of the scene and the origin, as given.
+    pub reach: V,
 }
 
 impl NarrowSlab {
     /// Nothing in particular.
-    pub const BLANK: Self = NarrowSlab {
-        reciprocal: [0.0; 4],
-        near_shift: [0.0; 4],
-        far_shift: [0.0; 4],
-        t_min: 0.0,
-        backwards: [false; 3],
-    };
+    pub const BLANK: Self =
+        NarrowSlab { reciprocal: [0.0; 4], near_shift: [0.0; 4], far_shift: [0.0; 4], t_min: 0.0 };
 
-    /// The ray from `origin` along `direction`, as given, for boxes within `reach`. `inverse` are the reciprocals of
-    /// the sizes of the direction's components, and `t_min` is the frame's.
+    /// The ray from `origin` along `direction`, as given. `inverse` are the reciprocals of the sizes of the direction's
+    /// components, and `t_min` is the frame's.
     #[inline(always)]
     pub(super) fn new<S: Width<4>>(
         s: S,
         [origin, direction, inverse]: [S::V; 3],
-        scales: Scales,
-        reach: f32,
+        scales: &Scales<S::V>,
         t_min: f32,
-        backwards: [bool; 3],
     ) -> Self {
-        let mut slab = NarrowSlab { t_min, backwards, ..Self::BLANK };
+        let mut slab = NarrowSlab { t_min, ..Self::BLANK };
         let [reciprocal, near_shift, far_shift] =
-            walls::<S, 4>(s, [origin, direction, inverse], scales, reach);
+            walls::<S, 4>(s, [origin, direction, inverse], scales);
         reciprocal.store(&mut slab.reciprocal);
         near_shift.store(&mut slab.near_shift);
         far_shift.store(&mut slab.far_shift);
@@ -103,10 +97,10 @@ impl NarrowSlab {
         let mut slab = NarrowSlab { ..*self };
         for k in 0..3 {
             let wider = self.reciprocal[k].abs() * (by * (1.0 + 8.0 * UNIT32));
-            let near = self.near_shift[k] + wider;
-            let far = self.far_shift[k] - wider;
-            slab.near_shift[k] = near + near.abs() * (4.0 * UNIT32);
-            slab.far_shift[k] = far - far.abs() * (4.0 * UNIT32);
+            let near = self.near_shift[k] - wider;
+            let far = self.far_shift[k] + wider;
+            slab.near_shift[k] = near - near.abs() * (4.0 * UNIT32);
+            slab.far_shift[k] = far + far.abs() * (4.0 * UNIT32);
         }
         slab
     }
@@ -119,9 +113,9 @@ impl Slab for NarrowSlab {
         for k in 0..3 {
             let r = self.reciprocal[k];
             let (lower, upper) = (lower[k], upper[k]);
-            let (first, last) = if self.backwards[k] { (upper, lower) } else { (lower, upper) };
-            let enter = first * r - self.near_shift[k];
-            let leave = last * r - self.far_shift[k];
+            let (first, last) = if r.is_sign_negative() { (upper, lower) } else { (lower, upper) };
+            let enter = first * r + self.near_shift[k];
+            let leave = last * r + self.far_shift[k];
             near = if enter > near { enter } else { near };
             far = if leave < far { leave } else { far };
         }
@@ -138,8 +132,8 @@ impl Slab for NarrowSlab {
         let r = Width::<4>::load(s, &self.reciprocal);
         let lower = Width::<4>::load(s, &[a, b, c, 0.0]).mul(r);
         let upper = Width::<4>::load(s, &[x, y, z, 0.0]).mul(r);
-        let enter = lower.min(upper).sub(Width::<4>::load(s, &self.near_shift));
-        let leave = lower.max(upper).sub(Width::<4>::load(s, &self.far_shift));
+        let enter = lower.min(upper).add(Width::<4>::load(s, &self.near_shift));
+        let leave = lower.max(upper).add(Width::<4>::load(s, &self.far_shift));
         let near = s.largest_of_three(enter).max(Width::<4>::splat(s, self.t_min));
         let far = s.least_of_three(leave).min(Width::<4>::splat(s, t_bound));
         let [mut first, mut last] = [[0.0; 4]; 2];
@@ -155,7 +149,11 @@ impl Slab for NarrowSlab {
             near_shift: splat(s, self.near_shift),
             far_shift: splat(s, self.far_shift),
             t_min: s.splat(self.t_min),
-            first: [0, 1, 2].map(|k| if self.backwards[k] { k + 3 } else { k }),
+            first: [0, 1, 2].map(|k| {
+                // All ones if the ray runs back: a mask, and numbers of floats, are the least that each bundle can do with.
+                let back = (self.reciprocal[k].to_bits() as i32 >> 31) as usize;
+                k * N + (3 * N & back)
+            }),
             s,
         }
     }
@@ -166,19 +164,17 @@ impl Slab for NarrowSlab {
 fn walls<S: Width<N>, const N: usize>(
     s: S,
     [origin, direction, inverse]: [S::V; 3],
-    scales: Scales,
-    reach: f32,
+    Scales { t, space, reach }: &Scales<S::V>,
 ) -> [S::V; 3] {
     // What can be computed before the reciprocals are there, which takes the longest.
-    let scale = s.splat(scales.t);
-    let ahead = origin.mul(scale).flipped_by(direction);
-    let relative = s.splat(RELATIVE_PAD);
-    let pad = ahead.abs().mul(relative).add(s.splat(NEGLIGIBLE * (reach * scales.t)));
-    let constant = s.splat(CONSTANT_PAD * (reach * scales.space));
+    let behind = s.splat(0.0).sub(origin.mul(*t)).flipped_by(direction);
+    let negligible = reach.mul(*t).mul(s.splat(NEGLIGIBLE));
+    let pad = behind.abs().mul(s.splat(RELATIVE_PAD)).add(negligible);
+    let constant = reach.mul(*space).mul(s.splat(CONSTANT_PAD));
     [
-        inverse.mul(scale).with_sign_of(direction),
-        inverse.mul(ahead.add(pad)).add(constant),
-        inverse.mul(ahead.sub(pad)).sub(constant),
+        inverse.mul(*t).with_sign_of(direction),
+        inverse.mul(behind.sub(pad)).sub(constant),
+        inverse.mul(behind.add(pad)).add(constant),
     ]
 }
 
@@ -194,7 +190,7 @@ struct NarrowBoxes<S, V> {
     near_shift: [V; 3],
     far_shift: [V; 3],
     t_min: V,
-    /// The walls that the ray passes first, among lower and upper ones.
+    /// Where the walls that the ray passes first begin, among the numbers of lower and upper ones.
     first: [usize; 3],
 }
 
@@ -225,14 +221,21 @@ impl<S, V: Copy> NarrowBoxes<S, V> {
         S: Width<N, V = V>,
         V: Lanes<N>,
     {
-        let first = &walls[self.first[k]];
-        let last = &walls[2 * k + 3 - self.first[k]];
+        let first = row(walls, self.first[k]);
+        let last = row(walls, (2 * k + 3) * N - self.first[k]);
         let r = self.reciprocal[k];
         Interval {
-            near: mul_sub::<V, FUSED, N>(self.s.load(first), r, self.near_shift[k]),
-            far: mul_sub::<V, FUSED, N>(self.s.load(last), r, self.far_shift[k]),
+            near: mul_add::<V, FUSED, N>(self.s.load(first), r, self.near_shift[k]),
+            far: mul_add::<V, FUSED, N>(self.s.load(last), r, self.far_shift[k]),
         }
     }
+}
+
+/// The walls whose numbers begin `at`.
+#[inline(always)]
+fn row<const N: usize>(walls: &[[f32; N]; 6], at: usize) -> &[f32; N] {
+    let rest = walls.as_flattened().get(at..);
+    rest.and_then(|rest| rest.first_chunk()).unwrap_or(&walls[0])
 }
 
 /// Boxes in `f32` for any ray: in the ray's frame, to which they are scaled unless they are ordinary.
@@ -255,13 +258,12 @@ impl FrameSlab {
         let reach = if reach < f32::MAX { larger(0.0, reach) } else { f32::MAX };
         let reach = larger(reach, f32::from_bits(largest_bits(&given.origin)));
         let is_ordinary = is_ordinary(reach);
-        let scales = Scales { t: 1.0, space: 1.0 };
+        let scales = Scales { t: [1.0], space: [1.0], reach: [reach * scale] };
         let ahead = if is_ordinary { *scale } else { 1.0 };
         let mut axes = [[slowest; 3]; 3];
         for (axis, (o, d)) in axes.iter_mut().zip(origin.iter().zip(direction)) {
             let lines = [[*o], [*d], [1.0 / larger(d.abs(), slowest)]];
-            let [[reciprocal], [near_shift], [far_shift]] =
-                walls::<_, 1>(Scalar, lines, scales, reach * scale);
+            let [[reciprocal], [near_shift], [far_shift]] = walls::<_, 1>(Scalar, lines, &scales);
             // Nothing is lost if boxes are scaled by this.
             let reciprocal = reciprocal * ahead;
             *axis = [reciprocal, near_shift, far_shift];
@@ -285,8 +287,8 @@ impl Slab for FrameSlab {
                 Some(scale) => (lower[k] * scale, upper[k] * scale),
             };
             let (first, last) = if r.is_sign_negative() { (upper, lower) } else { (lower, upper) };
-            let enter = first * r - near_shift;
-            let leave = last * r - far_shift;
+            let enter = first * r + near_shift;
+            let leave = last * r + far_shift;
             near = if less(near, enter) { enter } else { near };
             far = if less(leave, far) { leave } else { far };
             if less(far, near) {

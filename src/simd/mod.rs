@@ -332,6 +332,7 @@ impl Backend {
     }
 
     /// What queries use now.
+    #[inline]
     pub fn current() -> Backend {
         if !CHOOSES {
             return Backend::detected();

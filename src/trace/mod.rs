@@ -24,12 +24,12 @@ pub(crate) trait Question<'m> {
     const RARE: bool = false;
 
     /// The query, of which nothing beyond this `t` of the frame is asked.
-    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query;
+    fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query;
 
     /// The answer, from a query that a traversal has fed; `ended` is whether it ended the search.
     fn answer<S: Simd>(
         s: S,
-        block: &Block<'m>,
+        block: Finished<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
         ended: bool,
@@ -75,13 +75,11 @@ impl<'m, Q: Question<'m>, const SOON: bool> Kernel for Ask<'_, 'm, Q, SOON> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q::Answer {
         let Ask { block, ray, question } = self;
-        // Parts are not lent to what is out of line, which would have them all computed.
-        let block = &block.parts();
-        let reach = block.header.reach;
+        let reach = block.header().reach;
         let Some((late, slab)) = ray.set_out(s, reach) else {
             // A copy is lent: what was made by parts, as in an instance, had better not go through memory.
             let ray = *ray;
-            return ask_any(block.whole, &ray, question);
+            return ask_any(block, &ray, question);
         };
         let mut query = question.query(block, late.t_max);
         let mut prepared = None;
@@ -101,8 +99,7 @@ impl<'m, Q: Question<'m>, const SOON: bool> Kernel for Ask<'_, 'm, Q, SOON> {
 #[cold]
 #[inline(never)]
 fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
-    let block = &block.parts();
-    let reach = block.header.reach;
+    let reach = block.header().reach;
     // Where it is: a copy would be another kind of call, and twice the room.
     let mut prepared = ray.prepare_any(reach);
     let Some(ray) = &prepared else { return Q::nothing() };
@@ -121,7 +118,7 @@ fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> 
 /// [`trace`] for queries of any type.
 #[inline(never)]
 fn trace_any<const ORDERED: bool>(
-    block: &Block,
+    block: Finished,
     prepared: &mut Option<PreparedRay>,
     slab: &FrameSlab,
     mut query: Erased<ORDERED>,
@@ -137,14 +134,14 @@ fn hit<D: Decide>(
     best: &D::Met,
     watch: &mut impl Watch,
 ) -> Hit {
-    record(&block.parts(), best.place(), D::t(ray, best, watch), D::weights(best))
+    record(Scalar, block, best.place(), D::t(ray, best, watch), D::weights(best))
 }
 
 /// The record of a meeting.
 #[inline(always)]
-pub(crate) fn record(block: &Block, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
-    let Name { prim, geometry } = name(block, place);
-    Hit { t, u, v, prim, geometry, instance: NONE }
+pub(crate) fn record(s: impl Simd, block: Finished, place: Place, t: f32, [u, v]: [f32; 2]) -> Hit {
+    let Name { prim, geometry } = name(&block.parts(), place);
+    Hit::of_whole(s, Hit { t, u, v, prim, geometry, instance: NONE })
 }
 
 /// What the caller calls a primitive.
@@ -167,11 +164,13 @@ fn name(block: &Block, place: Place) -> Name {
 #[inline(always)]
 pub(crate) fn trace<S: Simd, Q: Query>(
     s: S,
-    block: &Block,
+    block: Finished,
     (late, prepared): (&impl Late, &mut Option<PreparedRay>),
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
+    // Here, where it is known what they are: parts that are not used cost nothing then.
+    let block = &block.parts();
     let leaves = &Leaves::of(block);
     match block.bundles {
         Bundles::Sixteen(bundles) if WIDE => {

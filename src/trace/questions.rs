@@ -3,7 +3,7 @@
 use core::marker::PhantomData;
 
 use super::{Question, ask, hit, record};
-use crate::block::{Block, Finished};
+use crate::block::Finished;
 use crate::query::{
     Any, Choice, Closest, Decide, Either, Exact, ExactMet, Filter, Locate, Wanted, Watch,
 };
@@ -49,27 +49,27 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question<'m> for ClosestHit<D
     const RARE: bool = W::COUNTS;
 
     #[inline(always)]
-    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        let filter = Filter::new(self.choice, block.geometries, block.prim_ids);
-        Closest::new(filter, block.triangle_blocks, t_max, self.watch)
+    fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query {
+        let filter = Filter::new(self.choice, block);
+        Closest::new(filter, t_max, self.watch)
     }
 
     #[inline(always)]
     fn answer<S: Simd>(
         s: S,
-        block: &Block,
+        block: Finished<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
         _ended: bool,
     ) -> Option<Hit> {
         if let Some(lane) = query.waiting() {
             if let Some((t, weights)) = D::sure(s, ray, &lane) {
-                return Some(record(block, lane.place, t, weights));
+                return Some(record(s, block, lane.place, t, weights));
             }
             query.settle(ray);
         }
         let Closest { best, watch, .. } = query;
-        Some(hit::<D>(block.whole, ray, best.as_ref()?, watch))
+        Some(hit::<D>(block, ray, best.as_ref()?, watch))
     }
 
     fn nothing() -> Option<Hit> {
@@ -83,13 +83,19 @@ impl<'m, D: Decide, W: Watch> Question<'m> for AnyHit<D, W> {
     const RARE: bool = W::COUNTS;
 
     #[inline(always)]
-    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        let filter = Filter::new(self.choice, block.geometries, block.prim_ids);
+    fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query {
+        let filter = Filter::new(self.choice, block);
         Any::new(filter, t_max, self.watch)
     }
 
     #[inline(always)]
-    fn answer<S: Simd>(_: S, _: &Block, _: &PreparedRay, _: &mut Self::Query, ended: bool) -> bool {
+    fn answer<S: Simd>(
+        _: S,
+        _: Finished<'m>,
+        _: &PreparedRay,
+        _: &mut Self::Query,
+        ended: bool,
+    ) -> bool {
         ended
     }
 
@@ -111,14 +117,14 @@ impl<'m, D: Decide, W: Watch> Question<'m> for EitherHit<D, W> {
     type Query = Either<'m, D, W>;
     type Answer = Option<Hit>;
 
-    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
+    fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query {
         let EitherHit { choice, watch, any, .. } = self;
         Either { closest: ClosestHit::new(choice, watch).query(block, t_max), any }
     }
 
     fn answer<S: Simd>(
         s: S,
-        block: &Block<'m>,
+        block: Finished<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
         ended: bool,
@@ -172,14 +178,14 @@ impl<'m, D: Decide> Question<'m> for LocateHit<D> {
     const RARE: bool = !D::ANY_BOXES;
 
     #[inline(always)]
-    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        Locate::new(self.wanted, t_max, block.prim_ids)
+    fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query {
+        Locate::new(self.wanted, t_max, block.parts().prim_ids)
     }
 
     #[inline(always)]
     fn answer<S: Simd>(
         _: S,
-        _: &Block,
+        _: Finished<'m>,
         _: &PreparedRay,
         query: &mut Self::Query,
         _: bool,
@@ -202,14 +208,14 @@ impl<'m> Question<'m> for ClosestMet {
     type Answer = Option<ExactMet>;
     const RARE: bool = true;
 
-    fn query(self, block: &Block<'m>, t_max: f32) -> Self::Query {
-        let filter = Filter::new(self.0, block.geometries, block.prim_ids);
-        Closest::new(filter, block.triangle_blocks, t_max, ())
+    fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query {
+        let filter = Filter::new(self.0, block);
+        Closest::new(filter, t_max, ())
     }
 
     fn answer<S: Simd>(
         _: S,
-        _: &Block,
+        _: Finished<'m>,
         ray: &PreparedRay,
         query: &mut Self::Query,
         _: bool,
