@@ -29,7 +29,8 @@ impl Waiting {
     /// Takes the triangle in this lane, which the ray surely meets in this part of itself, if that comes first and is within the
     /// ray's limits; whether it does.
     ///
-    /// The frame's limits are less than an ulp outside of the given ones: what lies strictly between them is within those.
+    /// The frame's limits are outside of the given ones by less than the part is wider than what is real: what lies strictly between
+    /// them is within those.
     #[inline(always)]
     pub fn takes(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
         let first = ray.t_min < part.near && part.far < self.first_before;

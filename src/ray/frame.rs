@@ -155,7 +155,7 @@ impl PreparedRay {
 
     /// What lies between these depths, from the origin, surely is of interest.
     ///
-    /// The frame's limits are less than an ulp outside of the given ones, so twice the slack is enough.
+    /// The frame's limits are less than an ulp or `TINY / 8` outside of the given ones, so twice the slack is enough.
     #[inline(always)]
     pub fn inner_depths(&self) -> [f32; 2] {
         let [low, high] = [self.t_min, self.t_max].map(|t| t * self.shear.depth_rate);

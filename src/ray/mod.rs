@@ -130,14 +130,16 @@ impl Hit {
     #[allow(unsafe_code, reason = "a promise about the layout drawn above")]
     #[inline(always)]
     pub(crate) fn of_whole(s: impl Simd, Hit { t, u, v, prim, geometry, instance }: Hit) -> Self {
-        #[repr(C)]
-        struct Whole([f32; 4], [u8; 8]);
+        #[repr(C, packed(4))]
+        struct Whole([f32; 4], u64);
         let mut first = [0.0; 4];
         Width::<4>::load(s, &[t, u, v, f32::from_bits(prim)]).store(&mut first);
-        let [a, b, c, d] = geometry.to_ne_bytes();
-        let [e, f, g, h] = instance.to_ne_bytes();
+        let [low, high] = match cfg!(target_endian = "little") {
+            true => [geometry, instance],
+            false => [instance, geometry],
+        };
         // SAFETY: any bits are a hit, and these are its 24 bytes in their order.
-        unsafe { core::mem::transmute(Whole(first, [a, b, c, d, e, f, g, h])) }
+        unsafe { core::mem::transmute(Whole(first, u64::from(high) << 32 | u64::from(low))) }
     }
 
     /// What the C entry points write for a ray that hits nothing.
