@@ -78,9 +78,9 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         goes_on
     }
 
-    /// Goes from the root to where the ray must be prepared; false if it never must.
+    /// Goes from the root to the first leaf; false if there is none.
     #[inline(always)]
-    fn arrive<S: Width<W> + Simd, L: Late, Q: Query, const W: usize>(
+    fn arrive<S: Width<W> + Simd, Q: Query, const W: usize>(
         &mut self,
         s: S,
         bundles: &[Bundle<W>],
@@ -89,14 +89,12 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         query: &mut Q,
     ) -> bool {
         let t_bounds = Width::<W>::splat(s, self.t_bound());
-        loop {
+        while !self.at.is_leaf() {
             if !self.pass::<S, Q, W>(s, bundles, leaves, boxes, t_bounds, query) {
                 return false;
             }
-            if L::SOON || self.at.is_leaf() {
-                return self.at != ChildRef::NONE;
-            }
         }
+        self.at != ChildRef::NONE
     }
 
     /// Goes from a bundle to the nearest of the children in the lanes of `mask`, and comes back to the others later; false
@@ -165,19 +163,19 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
 
 /// Offers `query` everything the ray meets, near bundles first; true when it ended the search.
 #[inline(always)]
-pub(crate) fn traverse_wide<S: Simd + Width<W>, L: Late, Q: Query, const W: usize>(
+pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     s: S,
     bundles: &[Bundle<W>],
     leaves: &Leaves,
-    (late, prepared): (&L, &mut Option<PreparedRay>),
+    (late, prepared): (&impl Late, &mut Option<PreparedRay>),
     slab: &impl Slab,
     query: &mut Q,
 ) -> bool {
     let boxes = &slab.wide::<S, W>(s);
     let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
     let mut walk = Walk::new(&mut columns, query.t_bound());
-    // Many rays pass the whole scene by. What only the others need is no business of the loop behind, either.
-    if prepared.is_none() && !walk.arrive::<S, L, Q, W>(s, bundles, leaves, boxes, query) {
+    // Many rays pass the whole scene by, or all its leaves. What only the others need is no business of the loop behind, either.
+    if prepared.is_none() && !walk.arrive::<S, Q, W>(s, bundles, leaves, boxes, query) {
         return false;
     }
     let ray = &*prepared.get_or_insert_with(|| late.prepare());

@@ -187,23 +187,7 @@ impl<S: Simd> LateRay<S> {
 /// A ray that is prepared when that is needed. What comes of it is kept elsewhere: it is lent to what is out of line, and
 /// must be in memory for that, but this can stay in registers.
 pub(crate) trait Late {
-    /// Whether to prepare it when it enters the first box, in the time that the next one takes to come from memory, or not before
-    /// it comes to a leaf.
-    const SOON: bool = true;
-
     fn prepare(&self) -> PreparedRay;
-}
-
-/// A ray that is likely to come to no leaf, as three of four that come to an instance.
-pub(crate) struct Passing<L>(pub L);
-
-impl<L: Late> Late for Passing<L> {
-    const SOON: bool = false;
-
-    #[inline(always)]
-    fn prepare(&self) -> PreparedRay {
-        self.0.prepare()
-    }
 }
 
 impl<S: Simd> Late for LateRay<S> {

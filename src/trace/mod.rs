@@ -13,7 +13,7 @@ use crate::grid::{self, Cells};
 use crate::kinds::{GRID, WIDE};
 use crate::prim::Leaves;
 use crate::query::{Decide, Erased, Meets, Query, Watch, geometry_of};
-use crate::ray::{Early, FrameSlab, Hit, Late, NONE, Passing, PreparedRay, Ray, Slab};
+use crate::ray::{Early, FrameSlab, Hit, Late, NONE, PreparedRay, Ray, Slab};
 use crate::simd::{self, Kernel, SMALL, Scalar, Simd};
 
 /// What is asked of a ray.
@@ -45,10 +45,10 @@ pub(crate) fn ask<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question:
     if SMALL || Q::RARE {
         return ask_any(block, ray, question);
     }
-    simd::dispatch(Ask::<_, true> { block, ray, question })
+    simd::dispatch(Ask { block, ray, question })
 }
 
-/// The same by a backend that is chosen already, for a ray that is likely to pass all leaves by.
+/// The same by a backend that is chosen already.
 #[inline(always)]
 pub(crate) fn ask_by<'m, S: Simd, Q: Question<'m>>(
     s: S,
@@ -59,17 +59,17 @@ pub(crate) fn ask_by<'m, S: Simd, Q: Question<'m>>(
     if SMALL || Q::RARE {
         return ask_any(block, ray, question);
     }
-    s.run(Ask::<_, false> { block, ray, question })
+    s.run(Ask { block, ray, question })
 }
 
-/// One ray, waiting for a backend, and whether it is [soon](Late::SOON) prepared.
-struct Ask<'a, 'm, Q, const SOON: bool> {
+/// One ray, waiting for a backend.
+struct Ask<'a, 'm, Q> {
     block: Finished<'m>,
     ray: &'a Ray,
     question: Q,
 }
 
-impl<'m, Q: Question<'m>, const SOON: bool> Kernel for Ask<'_, 'm, Q, SOON> {
+impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
     type Output = Q::Answer;
 
     #[inline(always)]
@@ -83,11 +83,7 @@ impl<'m, Q: Question<'m>, const SOON: bool> Kernel for Ask<'_, 'm, Q, SOON> {
         };
         let mut query = question.query(block, late.t_max);
         let mut prepared = None;
-        let ended = if SOON {
-            trace(s, block, (&late, &mut prepared), &slab, &mut query)
-        } else {
-            trace(s, block, (&Passing(late), &mut prepared), &slab, &mut query)
-        };
+        let ended = trace(s, block, (&late, &mut prepared), &slab, &mut query);
         // Nothing that is not prepared has met anything.
         let Some(ray) = &prepared else { return Q::nothing() };
         Q::answer(s, block, ray, &mut query, ended)
@@ -159,8 +155,8 @@ fn name(block: &Block, place: Place) -> Name {
     Name { prim: number - first, geometry }
 }
 
-/// Offers `query` what the ray meets, by the one traversal of the structure at hand. The ray is prepared when it enters the
-/// scene's box, unless it is.
+/// Offers `query` what the ray meets, by the one traversal of the structure at hand. The ray is prepared when it comes to a
+/// leaf, unless it is.
 #[inline(always)]
 pub(crate) fn trace<S: Simd, Q: Query>(
     s: S,
