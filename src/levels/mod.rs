@@ -90,7 +90,8 @@ impl<D: Across, W: Watch> Search for ClosestSearch<'_, '_, D, W> {
         if let Some((shown, record)) = self.world.shown(instance)
             && let Some(ray) = record.object_ray_by(s, self.ray, self.t_max, &mut room)
         {
-            let question = ClosestHit::<D, _, MEMORY>::new(self.world.choice(&shown), self.watch.lend());
+            let question =
+                ClosestHit::<D, _, MEMORY>::new(self.world.choice(&shown), self.watch.lend());
             if let Some(hit) = ask_by(s, shown.block, ray, question) {
                 self.take(Hit { instance, ..hit });
             }
