@@ -11,6 +11,7 @@ use crate::point::{Image, NearInstances, Nearest, Seek};
 use crate::prim::Leaves;
 use crate::query::{Filter, QueryOptions, clamped_weights, geometry_of};
 use crate::ray::NONE;
+use crate::simd::{self, Kernel, Simd};
 
 /// The point of a scene that is closest to a given one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,19 +125,40 @@ fn closest_in(
     Some((foot.square, hit))
 }
 
+/// Offers what is near.
 fn search(block: &Block, nearest: &mut impl Seek) {
     match block.bundles {
-        Bundles::Sixteen(bundles) if WIDE => bvh::search_wide(bundles, nearest),
-        Bundles::Eight(bundles) if WIDE => bvh::search_wide(bundles, nearest),
-        Bundles::Four(bundles) if WIDE => bvh::search_wide(bundles, nearest),
-        _ => match block.header.kind {
-            KIND_BVH => bvh::search(block.nodes, nearest),
-            KIND_GRID if GRID => {
-                let Block { grids, words, runs, .. } = *block;
-                let leaves = Leaves::of(block);
-                grid::search(&Cells { grids, words, runs, leaves }, nearest);
-            }
-            _ => nearest.all(),
-        },
+        Bundles::None => {}
+        _ => return simd::dispatch(InBundles { block, nearest }),
+    }
+    match block.header.kind {
+        KIND_BVH => bvh::search(block.nodes, nearest),
+        KIND_GRID if GRID => {
+            let Block { grids, words, runs, .. } = *block;
+            let leaves = Leaves::of(block);
+            grid::search(&Cells { grids, words, runs, leaves }, nearest);
+        }
+        _ => nearest.all(),
+    }
+}
+
+/// A search in a tree of bundles, waiting for a backend.
+struct InBundles<'b, 'm, N> {
+    block: &'b Block<'m>,
+    nearest: &'b mut N,
+}
+
+impl<N: Seek> Kernel for InBundles<'_, '_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self, s: S) {
+        let InBundles { block, nearest } = self;
+        match block.bundles {
+            Bundles::Sixteen(bundles) if WIDE => bvh::search_wide(s, bundles, nearest),
+            Bundles::Eight(bundles) if WIDE => bvh::search_wide(s, bundles, nearest),
+            Bundles::Four(bundles) if WIDE => bvh::search_wide(s, bundles, nearest),
+            _ => {}
+        }
     }
 }

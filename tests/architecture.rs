@@ -30,7 +30,7 @@ const HOUSE: &[(&str, &[&str])] = &[
             "sieve", "simd",
         ],
     ),
-    ("point", &["block", "instance", "math", "prim", "query", "ray"]),
+    ("point", &["block", "instance", "math", "prim", "query", "ray", "simd"]),
     ("choice", &["block", "math", "prim", "scene"]),
     ("list", &["block", "error", "prim", "scene"]),
     (
@@ -63,7 +63,10 @@ const HOUSE: &[(&str, &[&str])] = &[
     ("hits", &["block", "levels", "query", "ray", "simd", "trace"]),
     (
         "closest",
-        &["block", "bvh", "grid", "kinds", "levels", "math", "point", "prim", "query", "ray"],
+        &[
+            "block", "bvh", "grid", "kinds", "levels", "math", "point", "prim", "query", "ray",
+            "simd",
+        ],
     ),
     (
         "accel",

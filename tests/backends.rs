@@ -22,6 +22,16 @@ fn answers(accel: &Accel, rays: &[Ray], backend: Backend) -> Vec<(Option<[u32; 6
     rays.iter().flat_map(|ray| precisions.map(|precision| ask(ray, precision))).collect()
 }
 
+/// What it finds closest to the origins of some of them.
+fn closest(accel: &Accel, rays: &[Ray], backend: Backend) -> Vec<Option<[u32; 3]>> {
+    backend.force();
+    let ask = |ray: &Ray| {
+        let hit = accel.closest_point(ray.origin, f32::INFINITY, &QueryOptions::default())?;
+        Some([hit.distance.to_bits(), hit.geometry, hit.prim])
+    };
+    rays.iter().step_by(7).map(ask).collect()
+}
+
 #[test]
 fn all_backends_give_the_same_bits() {
     let best = Backend::detected();
@@ -37,6 +47,7 @@ fn all_backends_give_the_same_bits() {
             .collect();
         for (structure, accel) in all.accels() {
             let expected = answers(&accel, &rays, Backend::Scalar);
+            let near = closest(&accel, &rays, Backend::Scalar);
             hits += expected.iter().filter(|(hit, _)| hit.is_some()).count();
             for backend in Backend::ALL.into_iter().filter(|b| *b <= best) {
                 assert_eq!(backend.force(), backend);
@@ -44,6 +55,7 @@ fn all_backends_give_the_same_bits() {
                 for (i, (got, expected)) in got.iter().zip(&expected).enumerate() {
                     assert_eq!(got, expected, "{name} {structure} {backend:?} {:?}", rays[i / 2]);
                 }
+                assert_eq!(closest(&accel, &rays, backend), near, "{name} {structure} {backend:?}");
             }
         }
     }

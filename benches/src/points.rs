@@ -48,33 +48,40 @@ fn measure(name: &str, model: &Model, options: &Options) -> Result<()> {
     let kinds = [("in the box", anywhere(model, count)), ("near", near(model, count))];
     #[cfg_attr(not(feature = "embree"), expect(unused_mut, reason = "there are no others"))]
     let mut finders = ours(model)?;
+    let ours = finders.len();
     #[cfg(feature = "embree")]
     finders.extend(crate::embree::finders(model, options));
     println!("{name}: {} triangles, {count} points", model.triangle_count());
     println!("  {:<20}{:>12}{:>12}", "", kinds[0].0, kinds[1].0);
     let (lower, upper) = bounds(model);
     let allowed = ALLOWED * (upper - lower).max_element();
-    let mut table = vec![[0.0; 2]; finders.len()];
+    let mut table = vec![([0.0; 2], [0; 2]); finders.len()];
     for (k, (kind, points)) in kinds.iter().enumerate() {
         let mut right = vec![Hit::MISS; points.len()];
         finders[0].1.find(points, &mut right);
         let mut seconds = vec![Vec::new(); finders.len()];
         for _ in 0..options.run_count() {
-            for ((name, finder), seconds) in finders.iter().zip(&mut seconds) {
+            for (i, ((name, finder), seconds)) in finders.iter().zip(&mut seconds).enumerate() {
                 let (mut found, mut watch) = (vec![Hit::MISS; points.len()], Watch::new());
                 watch.time(|| finder.find(points, &mut found));
                 seconds.push(watch.take().seconds);
                 let far = |(a, b): &(&Hit, &Hit)| f64::from((a.t - b.t).abs()) > allowed;
                 let wrong = found.iter().zip(&right).filter(|pair| far(pair)).count();
-                ensure!(wrong == 0, "{name}: {wrong} points {kind}");
+                ensure!(wrong == 0 || i >= ours, "{name}: {wrong} points {kind}");
+                table[i].1[k] = wrong;
             }
         }
-        for (row, seconds) in table.iter_mut().zip(&mut seconds) {
+        for ((row, _), seconds) in table.iter_mut().zip(&mut seconds) {
             row[k] = 1e9 * median(seconds) / points.len() as f64;
         }
     }
-    for ((name, _), [first, second]) in finders.iter().zip(&table) {
-        println!("  {name:<20}{first:>12.0}{second:>12.0}");
+    for ((name, _), ([first, second], wrong)) in finders.iter().zip(&table) {
+        // What a peer computes in `f32` may come out farther.
+        let wrong = match wrong {
+            [0, 0] => String::new(),
+            [first, second] => format!("  ({first} and {second} wrong)"),
+        };
+        println!("  {name:<20}{first:>12.0}{second:>12.0}{wrong}");
     }
     println!();
     Ok(())

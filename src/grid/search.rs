@@ -12,7 +12,7 @@ const LEAST_STEP: f64 = 1.0 / 4096.0;
 /// The closest point of a primitive lies in a cell that lists it. A sphere twice as wide has eight times as many cells, so that the last
 /// one takes most of the time, although each begins anew.
 pub(crate) fn search(cells: &Cells, nearest: &mut impl Seek) {
-    let point = nearest.point().to_array();
+    let point = nearest.around().point.to_array();
     let outermost = |head: &GridHead| {
         let first = head.first_word as usize;
         let n = cells.words.get(first).map(|word| resolution(*word))?;
@@ -182,7 +182,7 @@ impl Outward {
         let down = if below { gap(self.point - self.wall(self.below)) } else { f64::INFINITY };
         let up = if above { gap(self.wall(self.above) - self.point) } else { f64::INFINITY };
         let least = if down < up { down } else { up };
-        if !(below || above) || !nearest.is_within(square + least) {
+        if !(below || above) || !nearest.around().is_within(square + least) {
             return None;
         }
         if above && !(down < up) {

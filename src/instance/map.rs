@@ -232,9 +232,8 @@ impl InstanceRecord {
             let shift = [m[3], m[7], m[11], 0.0, 0.0, 0.0, 0.0, 0.0];
             let from = s.widened(row).sub(s.widened(&shift));
             let [x, y, z] = from.spread();
-            let [along_x, along_y, along_z] = [0, 1, 2].map(|k| self.column(k));
-            let sum = s.twice(along_x).mul(x).add(s.twice(along_y).mul(y));
-            let sum = sum.add(s.twice(along_z).mul(z));
+            let sum = s.twice(self.column(0)).mul(x).add(s.twice(self.column(1)).mul(y));
+            let sum = sum.add(s.twice(self.column(2)).mul(z));
             *room = s.narrowed(sum.beside(from, f64::from(t_max)));
         } else {
             let [from, along] = self.object_ray(&Ray { t_max, ..*ray })?.rows();

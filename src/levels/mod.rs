@@ -35,7 +35,7 @@ pub(crate) fn closest<D: Across, W: Watch>(
     watch: W,
 ) -> Option<Hit> {
     let level = &block.level()?;
-    through::<ClosestSearch<D, W>>(&World { block, level, options }, ray, watch)
+    through::<ClosestSearch<D, W>>(&World::new(block, level, options), ray, watch)
 }
 
 /// Whether anything that `options` leave is hit in a block with instances.
@@ -47,7 +47,7 @@ pub(crate) fn any<D: Decide, W: Watch>(
     watch: W,
 ) -> bool {
     let Some(level) = &block.level() else { return false };
-    through::<AnySearch<D, W>>(&World { block, level, options }, ray, watch)
+    through::<AnySearch<D, W>>(&World::new(block, level, options), ray, watch)
 }
 
 /// The search for the closest hit.
@@ -90,7 +90,8 @@ impl<D: Across, W: Watch> Search for ClosestSearch<'_, '_, D, W> {
         if let Some((shown, record)) = self.world.shown(instance)
             && let Some(ray) = record.object_ray_by(s, self.ray, self.t_max, &mut room)
         {
-            let question = shown.closest_hit::<D, _>(self.world.options, self.watch.lend());
+            let question =
+                ClosestHit::<D, _, MEMORY>::new(self.world.choice(&shown), self.watch.lend());
             if let Some(hit) = ask_by(s, shown.block, ray, question) {
                 self.take(Hit { instance, ..hit });
             }
@@ -157,7 +158,7 @@ impl<D: Decide, W: Watch> Search for AnySearch<'_, '_, D, W> {
         if let Some((shown, record)) = self.world.shown(instance)
             && let Some(ray) = record.object_ray_by(s, self.ray, self.ray.t_max, &mut room)
         {
-            let question = shown.any_hit::<D, _>(self.world.options, self.watch.lend());
+            let question = AnyHit::<D, _>::new(self.world.choice(&shown), self.watch.lend());
             self.hit = ask_by(s, shown.block, ray, question);
         }
         (!self.hit).then_some(self.ray.t_max)
@@ -175,9 +176,27 @@ struct World<'a, 'm> {
     block: Finished<'m>,
     level: &'a Level<'m>,
     options: &'a QueryOptions,
+    /// What the options leave where nothing is skipped.
+    unskipped: Choice,
 }
 
-impl<'m> World<'_, 'm> {
+impl<'a, 'm> World<'a, 'm> {
+    fn new(block: Finished<'m>, level: &'a Level<'m>, options: &'a QueryOptions) -> Self {
+        let unskipped = Choice::new(&QueryOptions { skip: None, ..*options }, NONE, &[], 0);
+        World { block, level, options, unskipped }
+    }
+
+    /// What the options leave of what is shown.
+    ///
+    /// Mostly a copy of what was written long before: a processor waits for numbers that it has just written by parts.
+    #[inline(always)]
+    fn choice(&self, shown: &Shown) -> Choice {
+        match self.options.skip {
+            None => self.unskipped,
+            Some(_) => shown.choice(self.options),
+        }
+    }
+
     /// What an instance shows, if the options leave it and there is something.
     #[inline(always)]
     fn shown(&self, instance: u32) -> Option<(Shown<'m>, &'m InstanceRecord)> {

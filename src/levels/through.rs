@@ -1,5 +1,7 @@
 //! One ray through the index, and into each instance that it comes to.
 
+use core::hint::black_box;
+
 use super::World;
 use super::reach::{Reach, instance_of, is_calm, visit_reached};
 use crate::block::Bundles;
@@ -83,25 +85,35 @@ fn walk<S: Simd>(
         return None;
     }
     let (late, slab) = ray.set_out(s, index.header.reach)?;
-    let (boxes, t_scale) = (slab.wide::<S, 16>(s), late.t_scale());
+    let t_scale = late.t_scale();
     let in_frame = |limit: f32| f32_above(f64::from(limit) * t_scale);
-    let t_bound = if limit < ray.t_max { in_frame(limit) } else { late.t_max };
+    let (mut limit, mut t_bound) = (limit, late.t_max);
+    if limit < ray.t_max {
+        t_bound = in_frame(limit);
+    }
     let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
     let mut walk = Walk::new(&mut columns, t_bound);
     loop {
-        let t_bounds = Width::<16>::splat(s, walk.t_bound());
-        while !walk.at().is_leaf() {
-            let bundle = bundles.get(walk.at().bundle_number());
-            let entered = bundle.is_some_and(|bundle| {
-                walk.enter::<S, Reach<'_, '_, '_, ()>, 16>(s, bundle, &boxes, t_bounds)
-            });
-            if !entered {
-                return Some(());
+        if !walk.at().is_leaf() {
+            // From memory anew after a visit, over which no vector is kept: ten would be written and read for each.
+            let boxes = black_box(&slab).wide::<S, 16>(s);
+            let t_bounds = Width::<16>::splat(s, walk.t_bound());
+            while !walk.at().is_leaf() {
+                let bundle = bundles.get(walk.at().bundle_number());
+                let entered = bundle.is_some_and(|bundle| {
+                    walk.enter::<S, Reach<'_, '_, '_, ()>, 16>(s, bundle, &boxes, t_bounds)
+                });
+                if !entered {
+                    return Some(());
+                }
             }
         }
         let Some(instance) = instance_of(index, walk.at()) else { return Some(()) };
-        let Some(limit) = search.visit(s, instance) else { return Some(()) };
-        walk.leave::<S, Reach<'_, '_, '_, ()>>(s, in_frame(limit));
+        let Some(left) = search.visit(s, instance) else { return Some(()) };
+        if left < limit {
+            (limit, t_bound) = (left, in_frame(left));
+        }
+        walk.leave::<S, Reach<'_, '_, '_, ()>>(s, t_bound);
     }
 }
 

@@ -126,7 +126,7 @@ fn of_each<A: Asked>(
     answers: &mut [A::Answer],
 ) {
     let Some(level) = &block.level() else { return };
-    let chunk = Chunk(World { block, level, options });
+    let chunk = Chunk(World::new(block, level, options));
     // What cannot be is not linked.
     let flies = !SMALL && simd::dispatch(Flies);
     let cached = are_small(level);
@@ -165,7 +165,7 @@ impl<'m> Chunk<'_, 'm> {
         let count = rays.len().min(answers.len()).min(CHUNK);
         let (rays, answers) = (&rays[..count], &mut answers[..count]);
         answers.fill(A::NOTHING);
-        let World { block, level, options } = self.0;
+        let World { block, level, options, .. } = self.0;
         let own = Shown::own(block);
         if !own.is_empty() {
             batch::ask_all(own.block, rays, answers, A::question(own.choice(options)));

@@ -1,8 +1,6 @@
 //! The question of a point to an index: which instances come close.
 
-use glam::DVec3;
-
-use super::{SLACK, Seek, square_between};
+use super::{Around, Seek};
 use crate::block::leaf::{KIND_SPHERES, Place};
 use crate::block::level::Level;
 use crate::math::float::sqrt;
@@ -21,14 +19,11 @@ const MAILBOX: usize = 32;
 pub(crate) struct NearInstances<'a, 'm, 'v> {
     level: &'a Level<'m>,
     leaves: Leaves<'m>,
-    point: DVec3,
-    /// What distances to boxes and cells may be off.
-    slack: f64,
+    around: Around,
     /// The square of the distance up to which instances count.
     limit: f64,
-    /// How far to look for now, and the square of the distance beyond which no box is of interest.
+    /// How far to look for now.
     sight: f64,
-    bound: f64,
     /// The last that were visited, by number.
     visited: [u32; MAILBOX],
     visit: &'a mut Visit<'v>,
@@ -44,25 +39,23 @@ impl<'a, 'm, 'v> NearInstances<'a, 'm, 'v> {
     ) -> Self {
         let (point, index) = (wide(point), level.index.parts());
         let size = point.abs().max_element() + f64::from(index.header.reach);
-        let (leaves, slack) = (Leaves::of(&index), size * SLACK);
-        let (sight, bound, visited) = (f64::INFINITY, 0.0, [NONE; MAILBOX]);
-        let mut near =
-            NearInstances { level, leaves, point, slack, limit, sight, bound, visited, visit };
+        let (leaves, around) = (Leaves::of(&index), Around::new(point, size));
+        let (sight, visited) = (f64::INFINITY, [NONE; MAILBOX]);
+        let mut near = NearInstances { level, leaves, around, limit, sight, visited, visit };
         near.narrow();
         near
     }
 
     fn narrow(&mut self) {
-        let widened = self.sight.min(sqrt(self.limit)) + self.slack;
-        self.bound = widened * widened;
+        self.around.limit_to(self.sight.min(sqrt(self.limit)));
     }
 
     /// Visits an instance if its box comes within the bound.
     pub fn consider(&mut self, number: u32) {
         let slot = number as usize % MAILBOX;
         let Some(record) = self.level.instances.get(number as usize) else { return };
-        let square = square_between(self.point, &record.bounds);
-        if self.visited[slot] != number && self.is_within(square) {
+        let square = self.around.square_to(&record.bounds);
+        if self.visited[slot] != number && self.around.is_within(square) {
             self.visited[slot] = number;
             self.limit = (self.visit)(number);
             self.narrow();
@@ -71,13 +64,9 @@ impl<'a, 'm, 'v> NearInstances<'a, 'm, 'v> {
 }
 
 impl Seek for NearInstances<'_, '_, '_> {
-    fn point(&self) -> DVec3 {
-        self.point
-    }
-
     #[inline(always)]
-    fn is_within(&self, square: f64) -> bool {
-        !(square > self.bound)
+    fn around(&self) -> &Around {
+        &self.around
     }
 
     fn look_up_to(&mut self, distance: f64) {

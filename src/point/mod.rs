@@ -1,9 +1,10 @@
 //! The question of a point: what in the scene is closest to it.
 //!
-//! A structure offers a [`Seek`] the leaves whose boxes come within its [bound](Seek::is_within), near ones
+//! A structure offers a [`Seek`] the leaves whose boxes come within its [bound](Around::is_within), near ones
 //! first: [`Nearest`], which looks at primitives, or [`NearInstances`]. All arithmetic is `f64` in one order of operations, whatever the structure, so the answer has the same bits
 //! from all of them; how far it can be from the real one, `docs/METHODS.md` derives.
 
+mod around;
 mod ellipsoid;
 mod image;
 mod instances;
@@ -18,17 +19,17 @@ use crate::math::float::sqrt;
 use crate::math::{Aabb, Bits, wide};
 use crate::prim::Leaves;
 use crate::query::Filter;
+use crate::simd::{self, SMALL};
+pub(crate) use around::Around;
+use around::Sift;
 pub(crate) use image::Image;
 pub(crate) use instances::NearInstances;
 use shape::Foot;
 
 /// What looks for something close: a structure offers it leaves and obeys the bound. The same leaf may come again.
 pub(crate) trait Seek {
-    /// Where the point is.
-    fn point(&self) -> DVec3;
-
-    /// Whether something in a box at this distance, squared, may be the closest. True for a NaN.
-    fn is_within(&self, square: f64) -> bool;
+    /// Where the point is, and how close a box must come.
+    fn around(&self) -> &Around;
 
     /// Looks no farther than this for now.
     fn look_up_to(&mut self, distance: f64);
@@ -40,12 +41,6 @@ pub(crate) trait Seek {
 
     /// Considers those of `lanes` of a block that are in use.
     fn block(&mut self, block: (u32, usize), lanes: u32);
-
-    /// The square of the distance to a box; infinite to an empty one.
-    #[inline(always)]
-    fn square_to(&self, aabb: &Aabb) -> f64 {
-        square_between(self.point(), aabb)
-    }
 
     /// Considers the lanes of a leaf.
     fn leaf(&mut self, leaf: LeafRef) {
@@ -71,28 +66,21 @@ pub(crate) trait Seek {
 /// What is closest so far.
 pub(crate) struct Nearest<'m> {
     /// Where the point is, to boxes.
-    point: DVec3,
+    around: Around,
     /// Where it is to primitives, or rather to their images.
     world: DVec3,
     image: Image,
     filter: Filter<'m>,
     leaves: Leaves<'m>,
-    /// What computed distances to primitives and boxes may be off, together.
-    slack: f64,
     /// The square of the distance up to which everything counts.
     limit: f64,
     /// How far to look for now.
     sight: f64,
-    /// The square of the distance beyond which no box is of interest.
-    bound: f64,
     best: Option<(u32, Foot)>,
 }
 
-/// What distances may be off for each unit of the largest coordinates.
-///
-/// A computed distance is within 2^-46 of the distance and the longest edge, of which the sum is less than eight of these units;
-/// boxes and cells take a few roundings.
-const SLACK: f64 = 1.0 / (1u64 << 42) as f64;
+/// So few triangles are looked at one by one.
+const FEW: u32 = 4;
 
 impl<'m> Nearest<'m> {
     /// Nothing yet of what `image` makes of a block's primitives; what is not farther from `point` than the root of `limit`
@@ -107,10 +95,9 @@ impl<'m> Nearest<'m> {
     ) -> Self {
         let world = wide(point);
         let (point, size) = image.origin_of(world, f64::from(reach));
-        let slack = size * SLACK;
-        let (sight, bound, best) = (f64::INFINITY, 0.0, None);
+        let (around, sight) = (Around::new(point, size), f64::INFINITY);
         let mut nearest =
-            Nearest { point, world, image, filter, leaves, slack, limit, sight, bound, best };
+            Nearest { around, world, image, filter, leaves, limit, sight, best: None };
         nearest.narrow();
         nearest
     }
@@ -118,8 +105,7 @@ impl<'m> Nearest<'m> {
     /// Sets the bound by how far to look, by the limit and by what is closest so far.
     fn narrow(&mut self) {
         let best = self.best.map_or(self.limit, |(_, foot)| foot.square);
-        let widened = self.sight.min(sqrt(best) * self.image.shrinks()) + self.slack;
-        self.bound = widened * widened;
+        self.around.limit_to(self.sight.min(sqrt(best) * self.image.shrinks()));
     }
 
     /// The number of the closest primitive and the point on it.
@@ -143,13 +129,9 @@ impl<'m> Nearest<'m> {
 }
 
 impl Seek for Nearest<'_> {
-    fn point(&self) -> DVec3 {
-        self.point
-    }
-
     #[inline(always)]
-    fn is_within(&self, square: f64) -> bool {
-        !(square > self.bound)
+    fn around(&self) -> &Around {
+        &self.around
     }
 
     fn look_up_to(&mut self, distance: f64) {
@@ -170,12 +152,16 @@ impl Seek for Nearest<'_> {
     fn block(&mut self, (kind, number): (u32, usize), lanes: u32) {
         if kind == KIND_TRIANGLES {
             let Some(block) = self.leaves.triangle_blocks.get(number) else { return };
-            if !self.is_within(self.square_to(&block.aabb)) {
+            if !self.around.is_within(self.around.square_to(&block.aabb)) {
                 return;
             }
-            for lane in Bits(lanes & block.lanes()) {
+            let mut lanes = lanes & block.lanes();
+            if !SMALL && lanes.count_ones() > FEW {
+                lanes &= simd::dispatch(Sift(&self.around, block));
+            }
+            for lane in Bits(lanes) {
                 let corners = block.triangle(lane);
-                if self.is_within(self.square_to(&Aabb::around(&corners))) {
+                if self.around.is_within(self.around.square_to(&Aabb::around(&corners))) {
                     let corners = corners.map(|corner| self.image.of(corner));
                     let foot = shape::on_triangle(self.world, corners);
                     self.consider(Place::of_lane(number as u32, block.first, lane as u32), foot);
@@ -190,15 +176,4 @@ impl Seek for Nearest<'_> {
             }
         }
     }
-}
-
-/// The square of the distance of a point and a box; infinite for an empty one.
-#[inline(always)]
-fn square_between(point: DVec3, aabb: &Aabb) -> f64 {
-    let (below, above) = (wide(aabb.lower) - point, point - wide(aabb.upper));
-    let gap = |a: f64, b: f64| {
-        let gap = if a > b { a } else { b };
-        if gap > 0.0 { gap * gap } else { 0.0 }
-    };
-    gap(below.x, above.x) + gap(below.y, above.y) + gap(below.z, above.z)
 }
