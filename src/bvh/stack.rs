@@ -11,7 +11,8 @@ use crate::simd::{Simd, Width};
 /// Nodes to come back to, or what stands for them.
 pub(super) type Pending<E> = crate::pending::Pending<E, MAX_DEPTH>;
 
-/// Room for a [`Stack`].
+/// Room for a [`Stack`]. Aligned, and with it all else that a search keeps: vectors that lie across two cache lines are slow.
+#[repr(align(64))]
 pub(crate) struct Columns<const ROOM: usize> {
     near: [MaybeUninit<f32>; ROOM],
     refs: [MaybeUninit<u32>; ROOM],

@@ -89,6 +89,10 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         let waits = self.waiting.first_mut().is_some_and(|w| w.takes(ray, block, lane, part));
         if waits {
             self.t_bound = part.far;
+            // The name of what is likely to win comes from far away, and is asked for last.
+            if let Some(lane) = self.waiting() {
+                self.filter.fetch(lane.place);
+            }
         }
         waits
     }

@@ -103,6 +103,7 @@ impl Ray {
     #[inline(never)]
     pub(crate) fn prepare_any(&self, reach: f32) -> Option<PreparedRay> {
         let (farthest, longest) = (largest_bits(&self.origin), largest_bits(&self.direction));
+        let Ray { origin: [x, y, z], direction: [dx, dy, dz], .. } = *self;
         let (t_min, t_max) = (self.least(), self.most());
         let finite = farthest < EXPONENT && longest < EXPONENT;
         if !(finite && longest > 0 && t_min <= t_max) {
@@ -128,7 +129,7 @@ impl Ray {
         let above = rounded(t_max, t_exponent, Round::Above);
         let [below, above] = framed([below, above]);
         Some(PreparedRay {
-            given: Rows(Ray { t_min, t_max, ..*self }.rows()),
+            given: Rows([[x, y, z, t_min], [dx, dy, dz, t_max]]),
             scale,
             origin,
             direction,
