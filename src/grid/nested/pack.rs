@@ -1,13 +1,26 @@
 //! Packs the lists of some words into leaf blocks and runs.
 
 use super::lists::{BOX_WORDS, END};
+use super::recent::{Recent, TOGETHER};
 use crate::block::cells::{Cell, CellBox, LAST, Run, box_word, cell, run_word};
-use crate::block::leaf::{KIND_SPHERES, SPHERES, SphereBlock, TRIANGLES, TriangleBlock, block_ref};
+use crate::block::leaf::{
+    KIND_SPHERES, KIND_TRIANGLES, SPHERES, SphereBlock, TRIANGLES_AT_LEAST, TriangleBlock,
+    block_ref,
+};
 use crate::prim::{Packer, Shapes, Source};
 
 /// So many words begin with blocks of their own: whatever is in other words, theirs are packed alike, and on any thread. On average that leaves
 /// half a block free.
 pub(super) const CHUNK: usize = 1 << 11;
+
+/// Half of the triangles that any block has room for, rounded up.
+const ENOUGH_AT_LEAST: usize = TRIANGLES_AT_LEAST.div_ceil(2);
+
+/// The entries that the run of a list can have: a box, and one for each block, which holds three or is of a kind the first,
+/// the last, or being filled when some numbers are looked at together.
+fn most_runs(len: usize) -> usize {
+    (1 + len).min(6 + len / ENOUGH_AT_LEAST + 2 * (len / TOGETHER))
+}
 
 /// How much some words list.
 #[derive(Clone, Copy, Default)]
@@ -51,8 +64,7 @@ impl Lists<'_> {
                 let round = list.iter().filter(is_sphere).count();
                 tally.triangles += list.len() - round;
                 spheres += round;
-                // A box, and one for each block, of which the second and later ones hold five or are the last; of triangles and of spheres.
-                tally.runs += list.len().min(4 + list.len() / 5);
+                tally.runs += most_runs(list.len());
             }
             tally.spheres += spheres;
             tally.sphere_blocks += spheres.div_ceil(SPHERES);
@@ -121,7 +133,7 @@ impl Part<'_> {
             blocks: [triangle_blocks as u32, sphere_blocks as u32],
             ids: [triangle_ids.get_mut(triangle..)?, sphere_ids.get_mut(sphere..)?],
             id_counts: [0; 2],
-            open: (u32::MAX, [u32::MAX; TRIANGLES]),
+            recent: Recent::NONE,
             runs: self.runs,
             run_count: runs,
         };
@@ -158,13 +170,12 @@ impl Part<'_> {
 struct Emitter<'s, 'a, 'b> {
     shapes: Shapes<'s, 'a>,
     packer: Packer<'b>,
+    recent: Recent,
     /// So many blocks of triangles and of spheres are before those of the packer.
     blocks: [u32; 2],
     /// The numbers of triangles and of spheres, and how many there are.
     ids: [&'b mut [u32]; 2],
     id_counts: [usize; 2],
-    /// The triangle block being filled, and whose are its lanes.
-    open: (u32, [u32; TRIANGLES]),
     runs: &'b mut [Run],
     run_count: usize,
 }
@@ -179,45 +190,68 @@ impl Emitter<'_, '_, '_> {
 
     /// Packs a list.
     ///
-    /// A primitive is stored again for each cell that lists it, unless the block being filled holds it already.
+    /// A triangle is stored again for each cell that lists it, unless a block that was filled a moment ago holds it beside enough others of
+    /// the list.
     fn list(&mut self, list: &[u32]) -> Option<()> {
         let first = self.run_count;
-        for id in list {
-            let (block, lane) = self.pack(id & !END)?;
-            let is_same =
-                self.run_count > first && self.runs.get(self.run_count - 1)?.block == block;
-            if !is_same {
-                *self.runs.get_mut(self.run_count)? = Run { block, lanes: 0 };
-                self.run_count += 1;
-            }
-            self.runs.get_mut(self.run_count - 1)?.lanes |= 1 << lane;
+        for ids in list.chunks(TOGETHER) {
+            self.list_some(ids, first)?;
         }
         self.runs.get_mut(self.run_count - 1)?.lanes |= LAST;
         Some(())
     }
 
-    /// The block and the lane of a primitive: where it is in the open block, or a new place.
-    fn pack(&mut self, id: u32) -> Option<(u32, u32)> {
-        let (open, ids) = &mut self.open;
-        if let Some(lane) = ids.iter().position(|other| *other == id) {
-            return Some((*open, lane as u32));
+    /// The same of some of its numbers; its first run is `first`.
+    #[inline]
+    fn list_some(&mut self, ids: &[u32], first: usize) -> Option<()> {
+        let open = (self.packer.triangle_block_count() as u32).wrapping_sub(1);
+        let mut held = self.recent.hold(ids, open);
+        held.keep(self.enough(), |age, lanes| {
+            let block = block_ref(KIND_TRIANGLES, self.blocks[0] + open - age);
+            self.name(block, lanes, first)
+        })?;
+        for (i, id) in ids.iter().enumerate() {
+            if !held.has(i) {
+                let (block, lane) = self.pack(id & !END)?;
+                self.name(block, 1 << lane, first)?;
+            }
         }
+        Some(())
+    }
+
+    /// How many of a list a block must hold for them not to be stored again: half of what has filled a block so far.
+    #[inline]
+    fn enough(&self) -> u32 {
+        let blocks = self.packer.triangle_block_count().max(1);
+        ((self.id_counts[0] + blocks) / (2 * blocks)).max(ENOUGH_AT_LEAST) as u32
+    }
+
+    /// Lets the run that begins at `first` name lanes of a block.
+    #[inline]
+    fn name(&mut self, block: u32, lanes: u32, first: usize) -> Option<()> {
+        if self.run_count == first || self.runs.get(self.run_count - 1)?.block != block {
+            *self.runs.get_mut(self.run_count)? = Run { block, lanes: 0 };
+            self.run_count += 1;
+        }
+        self.runs.get_mut(self.run_count - 1)?.lanes |= lanes;
+        Some(())
+    }
+
+    /// Packs a primitive; returns the block and the lane.
+    #[inline]
+    fn pack(&mut self, id: u32) -> Option<(u32, u32)> {
         let (block, lane) = match self.shapes.corners(id) {
             Some(corners) => self.packer.push_triangle(corners)?,
             None => self.packer.push(&self.shapes.get(id)?)?,
         };
         let is_sphere = block >= block_ref(KIND_SPHERES, 0);
-        let block = block + self.blocks[usize::from(is_sphere)];
         if !is_sphere {
-            if block != *open {
-                (*open, *ids) = (block, [u32::MAX; TRIANGLES]);
-            }
-            *ids.get_mut(lane as usize)? = id;
+            self.recent.put(id, block - block_ref(KIND_TRIANGLES, 0), lane);
         }
         let next = &mut self.id_counts[usize::from(is_sphere)];
         *self.ids[usize::from(is_sphere)].get_mut(*next)? = id;
         *next += 1;
-        Some((block, lane))
+        Some((block + self.blocks[usize::from(is_sphere)], lane))
     }
 }
 
