@@ -11,6 +11,7 @@ use super::narrow::Narrow;
 use super::near::Near;
 use super::overlap::cells_near;
 use super::ray::CellRay;
+use super::sixteen::Sixteen;
 use super::space::Space;
 use super::steps::Level;
 use super::way::time_above;
@@ -253,9 +254,9 @@ fn insertion() {
         let mut listed = Vec::new();
         let looked_at = cells_near(&space, &shape, |cell| listed.push(cell));
         left_out += looked_at - listed.len() as u64;
-        let (mut near, mut abreast) = (Near::new(&space), Vec::new());
-        near.push(0, &shape);
-        near.take(|cell, _| abreast.push(cell));
+        let (mut sixteen, mut abreast) = (Sixteen::EMPTY, Vec::new());
+        sixteen.push(0, &shape);
+        Near::new(&space).find(&sixteen, &[], |cell, _| abreast.push(cell));
         let (range, wide) =
             (Narrow::new(&space).range_of(&shape.aabb()), space.range_of(&shape.aabb()));
         left_out_small += u64::from(is_small) * (range.cell_count() - abreast.len() as u64);

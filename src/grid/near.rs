@@ -4,48 +4,37 @@ use super::narrow::{Axis, Narrow};
 use super::overlap::{ACROSS, cells_near};
 use super::sixteen::{Sixteen, ends};
 use super::space::Space;
-use crate::prim::Shape;
 use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
 
-/// The cells of a grid, and what is to be looked up in them.
+/// The cells of a grid, in which primitives are looked up.
 pub(super) struct Near<'g> {
     space: &'g Space,
     narrow: Narrow,
     /// How far from a cell each of eight is, of which it is the first.
     steps: [usize; 8],
-    waiting: Sixteen,
 }
 
 impl<'g> Near<'g> {
     pub fn new(space: &'g Space) -> Self {
         let [nx, ny, _] = space.resolution.map(|n| n as usize);
         let steps = [0, 1, 2, 3, 4, 5, 6, 7].map(|o| (o & 1) + nx * ((o >> 1 & 1) + ny * (o >> 2)));
-        Near { space, narrow: Narrow::new(space), steps, waiting: Sixteen::EMPTY }
+        Near { space, narrow: Narrow::new(space), steps }
     }
 
-    /// Adds a primitive; whether that was the last for which there is room.
+    /// Calls `f` with the numbers of each cell and primitive that come near each other, in the order of the primitives, of which those with
+    /// the numbers `but` are left out; returns how many cells were looked at, or how many are near.
     #[inline(always)]
-    pub fn push(&mut self, id: u32, shape: &Shape) -> bool {
-        self.waiting.push(id, shape)
-    }
-
-    /// The same of a triangle.
-    #[inline(always)]
-    pub fn push_triangle(&mut self, id: u32, corners: [[f32; 3]; 3]) -> bool {
-        self.waiting.push_triangle(id, corners)
-    }
-
-    /// Calls `f` with the numbers of each cell and primitive that come near each other, of those that were added, in the order in which they were; returns
-    /// how many cells were looked at, or how many are near.
-    #[inline(always)]
-    pub fn take(&mut self, mut f: impl FnMut(usize, u32)) -> u64 {
-        let found = dispatch(Find { narrow: &self.narrow, sixteen: &self.waiting });
+    pub fn find(&self, sixteen: &Sixteen, but: &[u32], mut f: impl FnMut(usize, u32)) -> u64 {
+        let found = dispatch(Find { narrow: &self.narrow, sixteen });
         let mut work = 0;
-        for lane in 0..self.waiting.count.min(16) {
-            let id = self.waiting.ids[lane];
+        for lane in 0..sixteen.count.min(16) {
+            let id = sixteen.ids[lane];
+            if !but.is_empty() && but.contains(&id) {
+                continue;
+            }
             let mut bits = u32::from(found.bits[lane]);
             if bits == 0 {
-                work += cells_near(self.space, &self.waiting.shape(lane), |cell| f(cell, id));
+                work += cells_near(self.space, &sixteen.shape(lane), |cell| f(cell, id));
                 continue;
             }
             let first = self.space.number(found.first.map(|axis| axis[lane] as u32));
@@ -55,7 +44,6 @@ impl<'g> Near<'g> {
                 bits &= bits - 1;
             }
         }
-        self.waiting.clear();
         work
     }
 }

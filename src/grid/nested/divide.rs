@@ -8,6 +8,7 @@ use super::{TRIES, WORK};
 use crate::block::cells::{box_word, cell_count, grid_word, resolution_word};
 use crate::grid::near::Near;
 use crate::grid::options::GridOptions;
+use crate::grid::sixteen::Sixteen;
 use crate::grid::space::Space;
 use crate::prim::Source;
 
@@ -126,15 +127,17 @@ impl Divider<'_, '_, '_> {
         counts.fill(0);
         pairs.clear();
         let (mut work, mut full) = (0, false);
-        let (mut shapes, mut near) = (self.source.shapes(), Near::new(space));
+        let (mut shapes, near, mut sixteen) =
+            (self.source.shapes(), Near::new(space), Sixteen::EMPTY);
         for ids in ids.chunks(16) {
+            sixteen.clear();
             for id in ids {
                 match shapes.corners(*id) {
-                    Some(corners) => near.push_triangle(*id, corners),
-                    None => shapes.get(*id).is_some_and(|shape| near.push(*id, &shape)),
+                    Some(corners) => sixteen.push_triangle(*id, corners),
+                    None => shapes.get(*id).is_some_and(|shape| sixteen.push(*id, &shape)),
                 };
             }
-            work += near.take(|number, id| {
+            work += near.find(&sixteen, &[], |number, id| {
                 counts[number] += 1;
                 full |= pairs.push([number as u32, id]).is_none();
             });

@@ -210,11 +210,10 @@ impl Emitter<'_, '_, '_> {
             let block = block_ref(KIND_TRIANGLES, self.blocks[0] + open - age);
             self.name(block, lanes, first)
         })?;
-        for (i, id) in ids.iter().enumerate() {
-            if !held.has(i) {
-                let (block, lane) = self.pack(id & !END)?;
-                self.name(block, 1 << lane, first)?;
-            }
+        let (left, count) = held.left(ids);
+        for id in left.iter().take(count) {
+            let (block, lane) = self.pack(id & !END)?;
+            self.name(block, 1 << lane, first)?;
         }
         Some(())
     }

@@ -49,11 +49,12 @@ impl Recent {
             let id = id & !END;
             let slot = id as usize % SLOTS;
             let age = open.wrapping_sub(self.places[slot] >> 4);
-            if self.ids[slot] == id && age < BLOCKS {
-                *place_of_id = age as u8;
-                held.lanes[age as usize % BLOCKS as usize] |= 1 << (self.places[slot] & 15);
-                held.blocks |= 1 << age;
-            }
+            // No branches, since nobody could guess them.
+            let is_known = (self.ids[slot] == id) & (age < BLOCKS);
+            *place_of_id = if is_known { age as u8 } else { u8::MAX };
+            held.lanes[age as usize % BLOCKS as usize] |=
+                u16::from(is_known) << (self.places[slot] & 15);
+            held.blocks |= u64::from(is_known) << (age % BLOCKS);
         }
         held
     }
@@ -81,11 +82,16 @@ impl Held {
         Some(())
     }
 
-    /// Whether number `i` is in a block that was kept.
+    /// Those of the numbers that are in no block that was kept, and how many these are.
     #[inline]
-    pub fn has(&self, i: usize) -> bool {
-        let age = u32::from(self.ages[i % TOGETHER]);
-        age < BLOCKS && self.blocks >> age & 1 == 1
+    pub fn left(&self, ids: &[u32]) -> ([u32; TOGETHER], usize) {
+        let (mut left, mut count) = ([0; TOGETHER], 0);
+        for (id, age) in ids.iter().zip(self.ages) {
+            left[count % TOGETHER] = *id;
+            let age = u32::from(age);
+            count += usize::from((age >= BLOCKS) | (self.blocks >> (age % BLOCKS) & 1 == 0));
+        }
+        (left, count)
     }
 }
 
@@ -113,7 +119,8 @@ mod tests {
         let ids = [7, 8, 9, 10, 11 | END, 12];
         let mut held = recent.hold(&ids, 5);
         assert_eq!(kept(&mut held, 2), [(2, 0b10101), (0, 1 << 15)]);
-        assert_eq!([0, 1, 2, 3, 4, 5].map(|i| held.has(i)), [true, true, false, true, true, false]);
+        let (left, count) = held.left(&ids);
+        assert_eq!(left[..count], [9, 12]);
         let mut held = recent.hold(&ids[..2], 5);
         assert_eq!(kept(&mut held, 9), [(2, 0b101)], "all of them");
         let mut held = recent.hold(&ids[..2], 3 + BLOCKS);
