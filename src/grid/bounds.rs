@@ -256,7 +256,7 @@ fn insertion() {
         left_out += looked_at - listed.len() as u64;
         let (mut sixteen, mut abreast) = (Sixteen::EMPTY, Vec::new());
         sixteen.push(0, &shape);
-        Near::new(&space).find(&sixteen, &[], |cell, _| abreast.push(cell));
+        Near::new(&space).find(&sixteen, &[], |cell, _, _| abreast.push(cell));
         let (range, wide) =
             (Narrow::new(&space).range_of(&shape.aabb()), space.range_of(&shape.aabb()));
         left_out_small += u64::from(is_small) * (range.cell_count() - abreast.len() as u64);

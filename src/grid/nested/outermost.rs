@@ -1,7 +1,7 @@
 //! The grid that all but large primitives are in.
 
 use super::cost::{self, FULL};
-use super::fill::{Cells, make_room};
+use super::fill::{Cells, box_in, make_room};
 use super::growing::Growing;
 use super::large::Large;
 use super::lists::Room;
@@ -48,7 +48,7 @@ impl Part<'_> {
     fn take(&mut self, sixteen: &Sixteen, near: &Near, large: &[u32], most: u64) {
         let Part { counts, pairs, work, fits, .. } = self;
         if *fits && *work <= most {
-            *work += near.find(sixteen, large, |cell, id| {
+            *work += near.find(sixteen, large, |cell, id, _| {
                 counts[cell] += 1;
                 *fits &= pairs.push([cell as u32, id]).is_some();
             });
@@ -187,7 +187,8 @@ impl Outermost<'_, '_> {
         caller.for_each(&mut jobs, |job| {
             if let Some((cells, done)) = job {
                 cells.list(pairs);
-                *done = cells.finish(space, &mut source.shapes());
+                let mut shapes = source.shapes();
+                *done = cells.finish(|cell, ids| box_in(space, space.cell(cell), &mut shapes, ids));
             }
         });
         jobs.iter().flatten().try_for_each(|(_, done)| *done)

@@ -7,7 +7,7 @@ use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, SPHERES, SphereBlock, TRIANGLES_AT_LEAST, TriangleBlock,
     block_ref,
 };
-use crate::prim::{Packer, Shapes, Source};
+use crate::prim::{Packer, Shape, Shapes, Source};
 
 /// So many words begin with blocks of their own: whatever is in other words, theirs are packed alike, and on any thread. On average that leaves
 /// half a block free.
@@ -124,6 +124,7 @@ impl Part<'_> {
         let [triangle_ids, sphere_ids] = &mut self.ids;
         let mut emitter = Emitter {
             shapes: source.shapes(),
+            corners: [[[0.0; 3]; 3]; TOGETHER],
             packer: Packer::new(
                 self.triangle_blocks.get_mut(triangle_blocks..)?,
                 self.sphere_blocks.get_mut(sphere_blocks..)?,
@@ -169,6 +170,8 @@ impl Part<'_> {
 /// What a chunk is packed to.
 struct Emitter<'s, 'a, 'b> {
     shapes: Shapes<'s, 'a>,
+    /// The corners of what is packed next.
+    corners: [[[f32; 3]; 3]; TOGETHER],
     packer: Packer<'b>,
     recent: Recent,
     /// So many blocks of triangles and of spheres are before those of the packer.
@@ -211,8 +214,13 @@ impl Emitter<'_, '_, '_> {
             self.name(block, lanes, first)
         })?;
         let (left, count) = held.left(ids);
-        for id in left.iter().take(count) {
-            let (block, lane) = self.pack(id & !END)?;
+        let left = left.get(..count)?;
+        let triangles = self.look_up(left)?;
+        for (i, id) in left.iter().enumerate() {
+            let (block, lane) = match i < triangles {
+                true => self.pack_triangle(id & !END, self.corners[i % TOGETHER])?,
+                false => self.pack_sphere(id & !END)?,
+            };
             self.name(block, 1 << lane, first)?;
         }
         Some(())
@@ -236,21 +244,44 @@ impl Emitter<'_, '_, '_> {
         Some(())
     }
 
-    /// Packs a primitive; returns the block and the lane.
+    /// Brings the corners of triangles, which come before spheres; returns how many these are. All at once, as nothing then waits for
+    /// each of them.
     #[inline]
-    fn pack(&mut self, id: u32) -> Option<(u32, u32)> {
-        let (block, lane) = match self.shapes.corners(id) {
-            Some(corners) => self.packer.push_triangle(corners)?,
-            None => self.packer.push(&self.shapes.get(id)?)?,
-        };
-        let is_sphere = block >= block_ref(KIND_SPHERES, 0);
-        if !is_sphere {
-            self.recent.put(id, block - block_ref(KIND_TRIANGLES, 0), lane);
+    fn look_up(&mut self, ids: &[u32]) -> Option<usize> {
+        for (i, (id, corners)) in ids.iter().zip(&mut self.corners).enumerate() {
+            let id = id & !END;
+            *corners = match self.shapes.corners(id) {
+                Some(corners) => corners,
+                None => match self.shapes.get(id)? {
+                    Shape::Triangle(corners) => corners,
+                    Shape::Sphere { .. } | Shape::Box(_) => return Some(i),
+                },
+            };
         }
-        let next = &mut self.id_counts[usize::from(is_sphere)];
-        *self.ids[usize::from(is_sphere)].get_mut(*next)? = id;
-        *next += 1;
-        Some((block + self.blocks[usize::from(is_sphere)], lane))
+        Some(ids.len())
+    }
+
+    /// Packs a triangle; returns the block and the lane.
+    #[inline]
+    fn pack_triangle(&mut self, id: u32, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
+        let (block, lane) = self.packer.push_triangle(corners)?;
+        self.recent.put(id, block - block_ref(KIND_TRIANGLES, 0), lane);
+        self.write_id(id, 0)?;
+        Some((block + self.blocks[0], lane))
+    }
+
+    /// The same of what is no triangle.
+    fn pack_sphere(&mut self, id: u32) -> Option<(u32, u32)> {
+        let (block, lane) = self.packer.push(&self.shapes.get(id)?)?;
+        self.write_id(id, 1)?;
+        Some((block + self.blocks[1], lane))
+    }
+
+    #[inline]
+    fn write_id(&mut self, id: u32, kind: usize) -> Option<()> {
+        *self.ids[kind].get_mut(self.id_counts[kind])? = id;
+        self.id_counts[kind] += 1;
+        Some(())
     }
 }
 
