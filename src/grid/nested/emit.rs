@@ -33,8 +33,9 @@ pub(super) fn emit(
     let kept_at = keep(grown.most, grown.words, grown.listed, bytes)?;
     let (front, kept) = bytes.split_at_mut(kept_at);
     let (words, listed) = view::<u32>(kept, 0, grown.words + grown.listed)?.split_at(grown.words);
-    let lists = Lists { listed, triangle_limit: census.triangle_limit };
+    let lists = Lists { listed, triangle_limit: census.triangle_limit, few: 0 };
     let tallies = Tallies::new(words, lists, caller);
+    let lists = Lists { few: tallies.all.few(census.triangle_count), ..lists };
     let runs_at = front.len().checked_sub(size_of::<Run>() * tallies.all.runs)?;
     let runs_at = runs_at / ALIGNMENT * ALIGNMENT;
     let (front, runs) = front.split_at_mut(runs_at);

@@ -4,8 +4,7 @@ use super::lists::{BOX_WORDS, END};
 use super::recent::{Recent, TOGETHER};
 use crate::block::cells::{Cell, CellBox, LAST, Run, box_word, cell, run_word};
 use crate::block::leaf::{
-    KIND_SPHERES, KIND_TRIANGLES, SPHERES, SphereBlock, TRIANGLES_AT_LEAST, TriangleBlock,
-    block_ref,
+    KIND_SPHERES, KIND_TRIANGLES, SPHERES, SphereBlock, TriangleBlock, block_ref,
 };
 use crate::prim::{Packer, Shape, Shapes, Source};
 
@@ -13,10 +12,13 @@ use crate::prim::{Packer, Shape, Shapes, Source};
 /// half a block free.
 pub(super) const CHUNK: usize = 1 << 11;
 
-/// Half of the triangles that any block has room for, rounded up.
-const ENOUGH_AT_LEAST: usize = TRIANGLES_AT_LEAST.div_ceil(2);
+/// However few of a list a block must hold for them not to be stored again, these are enough only if they are not alone.
+const ENOUGH_AT_LEAST: usize = 2;
 
-/// The entries that the run of a list can have: a box, and one for each block, which holds three or is of a kind the first,
+/// Where leaf blocks come to more bytes than this for each triangle, if every cell has its own, less is enough.
+const MUCH: u64 = 60;
+
+/// The entries that the run of a list can have: a box, and one for each block, which holds two or is of a kind the first,
 /// the last, or being filled when some numbers are looked at together.
 fn most_runs(len: usize) -> usize {
     (1 + len).min(6 + len / ENOUGH_AT_LEAST + 2 * (len / TOGETHER))
@@ -39,6 +41,8 @@ pub(super) struct Lists<'s> {
     pub listed: &'s [u32],
     /// Numbers below are triangles.
     pub triangle_limit: u32,
+    /// Blocks with fewer triangles than this on average would take [`MUCH`] memory.
+    pub few: u64,
 }
 
 impl Lists<'_> {
@@ -74,6 +78,11 @@ impl Lists<'_> {
 }
 
 impl Tally {
+    /// With fewer triangles in a block it would be [`MUCH`] memory for `count` triangles.
+    pub fn few(&self, count: u32) -> u64 {
+        size_of::<TriangleBlock>() as u64 * self.triangles as u64 / (MUCH * u64::from(count.max(1)))
+    }
+
     pub fn add(&mut self, other: &Tally) {
         self.triangles += other.triangles;
         self.spheres += other.spheres;
@@ -135,6 +144,7 @@ impl Part<'_> {
             ids: [triangle_ids.get_mut(triangle..)?, sphere_ids.get_mut(sphere..)?],
             id_counts: [0; 2],
             recent: Recent::NONE,
+            few: lists.few,
             runs: self.runs,
             run_count: runs,
         };
@@ -174,6 +184,8 @@ struct Emitter<'s, 'a, 'b> {
     corners: [[[f32; 3]; 3]; TOGETHER],
     packer: Packer<'b>,
     recent: Recent,
+    /// See [`Lists::few`].
+    few: u64,
     /// So many blocks of triangles and of spheres are before those of the packer.
     blocks: [u32; 2],
     /// The numbers of triangles and of spheres, and how many there are.
@@ -226,11 +238,13 @@ impl Emitter<'_, '_, '_> {
         Some(())
     }
 
-    /// How many of a list a block must hold for them not to be stored again: half of what has filled a block so far.
+    /// How many of a list a block must hold for them not to be stored again: half of what has filled a block so far, or a quarter
+    /// where memory is dear.
     #[inline]
     fn enough(&self) -> u32 {
-        let blocks = self.packer.triangle_block_count().max(1);
-        ((self.id_counts[0] + blocks) / (2 * blocks)).max(ENOUGH_AT_LEAST) as u32
+        let (stored, blocks) = (self.id_counts[0], self.packer.triangle_block_count().max(1));
+        let part = if (stored as u64) < self.few * blocks as u64 { 4 } else { 2 };
+        ((stored + part / 2 * blocks) / (part * blocks)).max(ENOUGH_AT_LEAST) as u32
     }
 
     /// Lets the run that begins at `first` name lanes of a block.
