@@ -148,28 +148,18 @@ impl Part<'_> {
             runs: self.runs,
             run_count: runs,
         };
-        let mut listed = [0; 2];
         for word in self.words.chunks_mut(CHUNK).nth(chunk)? {
             let Some((list, cell_box)) = lists.of(*word) else { continue };
-            let first = match cell_box {
+            *word = match cell_box {
                 Some(cell_box) => box_word(emitter.cell_box(cell_box)?),
                 None => run_word(emitter.run_count as u32),
             };
-            *word = first;
-            let before = emitter.id_counts;
             emitter.list(list)?;
-            let spheres = emitter.id_counts[1] - before[1];
-            listed = [listed[0] + list.len() - spheres, listed[1] + spheres];
         }
-        let Emitter { packer, ids, id_counts, run_count, .. } = emitter;
-        // Numbers of triangles that were in the open block when they were listed again.
-        ids.into_iter().zip(id_counts).zip(listed).try_for_each(|((ids, from), to)| {
-            ids.get_mut(from..to)?.fill(0);
-            Some(())
-        })?;
+        let Emitter { packer, id_counts, run_count, .. } = emitter;
         self.used = Used {
-            ids: [triangle + listed[0], sphere + listed[1]],
-            sphere_blocks: sphere_blocks + listed[1].div_ceil(SPHERES),
+            ids: [triangle + id_counts[0], sphere + id_counts[1]],
+            sphere_blocks: sphere_blocks + packer.sphere_block_count(),
             triangle_blocks: triangle_blocks + packer.triangle_block_count(),
             runs: run_count,
         };
