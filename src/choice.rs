@@ -12,7 +12,9 @@ use glam::DVec3;
 const FEW_RAYS: f32 = 0.6;
 /// The same where they are in order, as trees are built faster then.
 const FEW_IN_ORDER: f32 = 0.5;
-/// The same where they are not compact or, in order, [thick](Spread::is_thick).
+/// The same where they are not in order and [thick](Spread::is_thick).
+const FEW_IF_THICK: f32 = 0.2;
+/// The same where they are not compact or, in order, thick.
 const FEW_IN_SLOW_CELLS: f32 = 0.06;
 
 /// So [crowded](Spread::crowd), half as many rays are few.
@@ -36,6 +38,7 @@ pub(crate) fn suits_grid(scene: &Scene, census: &Census, rays_per_prim: f32) -> 
     let spread = Spread::of(scene, census);
     let few = match () {
         () if spread.cells > COMPACT => FEW_IN_SLOW_CELLS,
+        () if spread.in_order < IN_ORDER && spread.is_thick() => FEW_IF_THICK,
         () if spread.in_order < IN_ORDER => FEW_RAYS,
         () if spread.is_thick() => FEW_IN_SLOW_CELLS,
         () => FEW_IN_ORDER,

@@ -8,13 +8,15 @@ use raykern_harness::oracle::dyadic::Dyadic;
 use raykern_harness::search::{Worst, samples};
 
 use super::narrow::Narrow;
-use super::near::Near;
+use super::near::{NOTHING, Near, Sum};
 use super::overlap::cells_near;
 use super::ray::CellRay;
+use super::sixteen::Sixteen;
 use super::space::Space;
 use super::steps::Level;
 use super::way::time_above;
 use super::{FINEST, dilation};
+use crate::block::cells::CellBox;
 use crate::math::{Aabb, wide};
 use crate::prim::Shape;
 use crate::ray::{PreparedRay, Ray};
@@ -231,7 +233,7 @@ fn insertion() {
     const SEED: u64 = 43;
     println!("seed {SEED}");
     let mut random = Random::new(SEED);
-    let (mut points, mut left_out, mut left_out_small) = (0, 0, 0);
+    let (mut points, mut left_out, mut left_out_small, mut tight) = (0, 0, 0, 0);
     for _ in 0..samples(3_000) {
         let aabb = bounds(&mut random);
         let n = [0; 3].map(|_| 1 + random.below(40) as u32);
@@ -253,9 +255,15 @@ fn insertion() {
         let mut listed = Vec::new();
         let looked_at = cells_near(&space, &shape, |cell| listed.push(cell));
         left_out += looked_at - listed.len() as u64;
-        let (mut near, mut abreast) = (Near::new(&space), Vec::new());
-        near.push(0, &shape);
-        near.take(|cell, _| abreast.push(cell));
+        let (mut sixteen, mut abreast) = (Sixteen::EMPTY, Vec::new());
+        sixteen.push(0, &shape);
+        let (near, mut sum) = (Near::new(&space), NOTHING);
+        near.find(&sixteen, &[], |cell, _, ends| {
+            abreast.push(cell);
+            ends.add(&mut sum);
+        });
+        tight +=
+            abreast.iter().filter(|cell| box_is_tight(&space, &near, **cell, &shape, &sum)).count();
         let (range, wide) =
             (Narrow::new(&space).range_of(&shape.aabb()), space.range_of(&shape.aabb()));
         left_out_small += u64::from(is_small) * (range.cell_count() - abreast.len() as u64);
@@ -290,6 +298,22 @@ fn insertion() {
     }
     assert!(points > 10_000 && left_out > 10_000, "{points} {left_out}");
     assert!(left_out_small > 300, "{left_out_small}");
+    assert!(tight > 5_000, "{tight}");
+}
+
+/// Whether a box in a cell is what it would be if nothing were rounded; it is never smaller.
+fn box_is_tight(space: &Space, near: &Near, number: usize, shape: &Shape, sum: &Sum) -> bool {
+    let (cell, aabb) = (space.cell(number as u32), shape.aabb());
+    let (mut lower, mut upper) = (space.point(aabb.lower), space.point(aabb.upper));
+    for k in 0..3 {
+        lower[k] -= f64::from(cell[k]) + 2.0 * space.dilation[k];
+        upper[k] -= f64::from(cell[k]) - 2.0 * space.dilation[k];
+    }
+    let (found, exact) = (near.box_in(cell, sum), CellBox::around(lower, upper));
+    let is_around =
+        (0..3).all(|k| found.lower[k] <= exact.lower[k] && found.upper[k] >= exact.upper[k]);
+    assert!(is_around, "{space:?} {shape:?} {cell:?}: {found:?} {exact:?}");
+    found == exact
 }
 
 /// All that a block can hold lies inside the walls by more than rounding the times of entry and exit can take.

@@ -4,59 +4,94 @@ use super::narrow::{Axis, Narrow};
 use super::overlap::{ACROSS, cells_near};
 use super::sixteen::{Sixteen, ends};
 use super::space::Space;
-use crate::prim::Shape;
+use crate::block::cells::CellBox;
 use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
 
-/// The cells of a grid, and what is to be looked up in them.
+/// The cells of a grid, in which primitives are looked up.
 pub(super) struct Near<'g> {
     space: &'g Space,
     narrow: Narrow,
     /// How far from a cell each of eight is, of which it is the first.
     steps: [usize; 8],
-    waiting: Sixteen,
 }
 
 impl<'g> Near<'g> {
     pub fn new(space: &'g Space) -> Self {
         let [nx, ny, _] = space.resolution.map(|n| n as usize);
         let steps = [0, 1, 2, 3, 4, 5, 6, 7].map(|o| (o & 1) + nx * ((o >> 1 & 1) + ny * (o >> 2)));
-        Near { space, narrow: Narrow::new(space), steps, waiting: Sixteen::EMPTY }
+        Near { space, narrow: Narrow::new(space), steps }
     }
 
-    /// Adds a primitive; whether that was the last for which there is room.
+    /// Calls `f` with the numbers of each cell and primitive that come near each other and the box of the latter, in the order of the
+    /// primitives, of which those with the numbers `but` are left out; returns how many cells were looked at, or how many are near.
     #[inline(always)]
-    pub fn push(&mut self, id: u32, shape: &Shape) -> bool {
-        self.waiting.push(id, shape)
-    }
-
-    /// The same of a triangle.
-    #[inline(always)]
-    pub fn push_triangle(&mut self, id: u32, corners: [[f32; 3]; 3]) -> bool {
-        self.waiting.push_triangle(id, corners)
-    }
-
-    /// Calls `f` with the numbers of each cell and primitive that come near each other, of those that were added, in the order in which they were; returns
-    /// how many cells were looked at, or how many are near.
-    #[inline(always)]
-    pub fn take(&mut self, mut f: impl FnMut(usize, u32)) -> u64 {
-        let found = dispatch(Find { narrow: &self.narrow, sixteen: &self.waiting });
+    pub fn find(&self, sixteen: &Sixteen, but: &[u32], mut f: impl FnMut(usize, u32, Ends)) -> u64 {
+        let found = dispatch(Find { narrow: &self.narrow, sixteen });
         let mut work = 0;
-        for lane in 0..self.waiting.count.min(16) {
-            let id = self.waiting.ids[lane];
+        for lane in 0..sixteen.count.min(16) {
+            let id = sixteen.ids[lane];
+            if !but.is_empty() && but.contains(&id) {
+                continue;
+            }
+            let ends = Ends { of: &found.ends, lane };
             let mut bits = u32::from(found.bits[lane]);
             if bits == 0 {
-                work += cells_near(self.space, &self.waiting.shape(lane), |cell| f(cell, id));
+                work += cells_near(self.space, &sixteen.shape(lane), |cell| f(cell, id, ends));
                 continue;
             }
             let first = self.space.number(found.first.map(|axis| axis[lane] as u32));
             work += u64::from(bits.count_ones());
             while bits != 0 {
-                f(first + self.steps[bits.trailing_zeros() as usize % 8], id);
+                f(first + self.steps[bits.trailing_zeros() as usize % 8], id, ends);
                 bits &= bits - 1;
             }
         }
-        self.waiting.clear();
         work
+    }
+
+    /// The box of what is in a cell, as far as it is in that and wider by what a walk may be off, from boxes [added up](Ends::add).
+    pub fn box_in(&self, cell: [u32; 3], sum: &Sum) -> CellBox {
+        let (mut lower, mut upper) = ([0.0; 3], [0.0; 3]);
+        for k in 0..3 {
+            let [least, most] = [sum[k], sum[k + 4]].map(|x| f64::from(f32::from_bits(x)));
+            // What the coordinates have lost to rounding is in the reach.
+            let around = self.space.dilation[k] + f64::from(self.narrow.reach[k]);
+            lower[k] = least - f64::from(cell[k]) - around;
+            upper[k] = -most - f64::from(cell[k]) + around;
+        }
+        CellBox::around(lower, upper)
+    }
+}
+
+/// The box of a primitive that is looked up, in cells.
+#[derive(Clone, Copy)]
+pub(super) struct Ends<'f> {
+    of: &'f [[[f32; 16]; 2]; 3],
+    lane: usize,
+}
+
+/// The box around several: bits of the least coordinates, and of the least that the largest are with their signs changed.
+///
+/// ```text
+/// word 0       3   4          7   8
+///      | x y z | - | -x -y -z | - |
+/// ```
+pub(super) type Sum = [u32; 8];
+
+/// That of none.
+pub(super) const NOTHING: Sum = [f32::INFINITY.to_bits(); 8];
+
+impl Ends<'_> {
+    /// Adds it to others.
+    #[inline(always)]
+    pub fn add(self, sum: &mut Sum) {
+        let [[x, to_x], [y, to_y], [z, to_z]] = self.of;
+        let i = self.lane % 16;
+        let own = [x[i], y[i], z[i], z[i], -to_x[i], -to_y[i], -to_z[i], -to_z[i]];
+        for (sum, x) in sum.iter_mut().zip(own) {
+            let least = f32::from_bits(*sum);
+            *sum = if x < least { x } else { least }.to_bits();
+        }
     }
 }
 
@@ -64,6 +99,8 @@ impl<'g> Near<'g> {
 struct Found {
     /// The first cell along each axis.
     first: [[f32; 16]; 3],
+    /// The least and the largest coordinate along each axis, in cells.
+    ends: [[[f32; 16]; 2]; 3],
     /// One bit for each of the eight cells from there on, `x` first, that a primitive comes near; none if it is too large to tell.
     bits: [u8; 16],
 }
@@ -89,7 +126,7 @@ impl Kernel for Find<'_> {
     fn run<S: Simd>(self, s: S) -> Found {
         let Find { narrow, sixteen } = self;
         let (zero, most) = (splat(s, 0.0), splat(s, MOST));
-        let mut found = Found { first: [[0.0; 16]; 3], bits: [0; 16] };
+        let mut found = Found { first: [[0.0; 16]; 3], ends: [[[0.0; 16]; 2]; 3], bits: [0; 16] };
         let mut corners = [[zero; 3]; 3];
         let (mut small, mut two) = (!(!0 << sixteen.count.min(16)), [0; 3]);
         for k in 0..3 {
@@ -99,6 +136,8 @@ impl Kernel for Find<'_> {
             let [least, largest] = ends(at);
             let (first, last) = (axis.first(least), axis.last(largest));
             first.store(&mut found.first[k]);
+            least.store(&mut found.ends[k][0]);
+            largest.store(&mut found.ends[k][1]);
             let more = last.sub(first);
             small &= more.less_or_equal(splat(s, 1.0));
             small &= first.sub(least).less_or_equal(most) & largest.sub(first).less_or_equal(most);

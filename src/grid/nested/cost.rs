@@ -8,9 +8,9 @@ use crate::math::float::cube_root;
 
 /// Cells for each primitive in the outermost grid, and in those within cells.
 const OUTER_DENSITY: f64 = 0.02;
-const INNER_DENSITY: f64 = 0.25;
-/// A cell with no more than this many primitives is not divided.
-pub(super) const FULL: u32 = 16;
+const INNER_DENSITY: f64 = 0.2;
+/// A cell with no more than this many primitives is not divided: by the rule it never pays below 49, and hardly ever below this.
+pub(super) const FULL: u32 = 96;
 /// The most cells along an axis of a grid within a cell.
 const MOST_INNER: f64 = 64.0;
 
@@ -20,7 +20,7 @@ const IN_A_BLOCK: u32 = 12;
 const ENTRY: f64 = 4.0;
 
 /// The same of listing as many primitives again as a cell holds: for the memory, and for the time to build it.
-const TWICE: f64 = 8.0;
+const TWICE: f64 = 12.0;
 
 /// The resolution of the outermost grid over `count` primitives, `coarser` times too coarse along each axis.
 pub(super) fn outer(bounds: &Aabb, options: &GridOptions, count: u32, coarser: u32) -> [u32; 3] {

@@ -6,8 +6,10 @@ use super::growing::Growing;
 use super::lists::{Record, Waiting};
 use super::{TRIES, WORK};
 use crate::block::cells::{box_word, cell_count, grid_word, resolution_word};
-use crate::grid::near::Near;
+use crate::grid::list::List;
+use crate::grid::near::{NOTHING, Near, Sum};
 use crate::grid::options::GridOptions;
+use crate::grid::sixteen::Sixteen;
 use crate::grid::space::Space;
 use crate::prim::Source;
 
@@ -24,6 +26,8 @@ pub(super) struct Divider<'s, 'a, 'p> {
     /// The lists of the cells.
     pub list: &'p [u32],
     pub growing: Growing<'p>,
+    /// How many pairs of a cell and a number there are in the grid that was counted last.
+    pub pair_count: usize,
     /// How many numbers cells may list, and how many they do, waiting ones too.
     pub most: u64,
     pub total: u64,
@@ -81,13 +85,13 @@ impl Divider<'_, '_, '_> {
                 cost::inner(&self.space, &cell.place, self.options, cell.count, coarser);
             let Some(resolution) = resolution else { break };
             let space = self.space.within(cell.place, resolution);
-            let first = self.growing.words.end();
-            let counted = self.count_all(cell, &space);
+            let (first, near) = (self.growing.words.end(), Near::new(&space));
+            let counted = self.count_all(cell, &space, &near);
             if counted == Counted::WorthIt {
-                self.total += self.growing.pairs.len() as u64;
+                self.total += self.pair_count as u64;
                 self.total -= u64::from(cell.count);
                 self.finest = space.parts().into_iter().fold(self.finest, f64::max);
-                self.fill(&space, first + 1)?;
+                self.fill(&space, &near, first + 1)?;
                 return Some(Some(grid_word(first as u32)));
             }
             self.growing.words.shrink_to(first);
@@ -101,13 +105,13 @@ impl Divider<'_, '_, '_> {
     }
 
     /// Begins the grid in a cell by counting what is in its cells.
-    fn count_all(&mut self, cell: &Waiting, space: &Space) -> Counted {
+    fn count_all(&mut self, cell: &Waiting, space: &Space, near: &Near) -> Counted {
         let cells = cell_count(space.resolution) as usize;
         let Some(first) = self.growing.words.grow(1 + cells) else { return Counted::NoRoom };
         self.growing.words.from(first)[0] = resolution_word(space.resolution);
-        let counted = self.count_refs(cell, space, first + 1);
+        let counted = self.count_refs(cell, near, first + 1);
         if counted == Counted::WorthIt {
-            let would = self.total + self.growing.pairs.len() as u64 - u64::from(cell.count);
+            let would = self.total + self.pair_count as u64 - u64::from(cell.count);
             self.peak = self.peak.max(would);
         }
         let counts = &self.growing.words.from(first)[1..];
@@ -117,26 +121,32 @@ impl Divider<'_, '_, '_> {
         counted
     }
 
-    /// Writes down which primitives come near which cells, and counts them.
-    fn count_refs(&mut self, cell: &Waiting, space: &Space, first: usize) -> Counted {
+    /// Writes down which primitives come near which cells, counts them, and adds up their boxes.
+    fn count_refs(&mut self, cell: &Waiting, near: &Near, first: usize) -> Counted {
         let left = (self.most + u64::from(cell.count)).saturating_sub(self.total);
         let ids = &self.list[cell.first as usize..][..cell.count as usize];
         let Growing { words, pairs, .. } = &mut self.growing;
         let counts = words.from(first);
         counts.fill(0);
         pairs.clear();
+        let Some((boxes, mut pairs)) = boxes_and_pairs(pairs.rest(), counts.len()) else {
+            return Counted::NoRoom;
+        };
+        boxes.fill(NOTHING);
         let (mut work, mut full) = (0, false);
-        let (mut shapes, mut near) = (self.source.shapes(), Near::new(space));
+        let (mut shapes, mut sixteen) = (self.source.shapes(), Sixteen::EMPTY);
         for ids in ids.chunks(16) {
+            sixteen.clear();
             for id in ids {
                 match shapes.corners(*id) {
-                    Some(corners) => near.push_triangle(*id, corners),
-                    None => shapes.get(*id).is_some_and(|shape| near.push(*id, &shape)),
+                    Some(corners) => sixteen.push_triangle(*id, corners),
+                    None => shapes.get(*id).is_some_and(|shape| sixteen.push(*id, &shape)),
                 };
             }
-            work += near.take(|number, id| {
+            work += near.find(&sixteen, &[], |number, id, ends| {
                 counts[number] += 1;
                 full |= pairs.push([number as u32, id]).is_none();
+                ends.add(&mut boxes[number]);
             });
             if full || pairs.len() as u64 > left {
                 return Counted::NoRoom;
@@ -145,11 +155,12 @@ impl Divider<'_, '_, '_> {
                 return Counted::TooFine;
             }
         }
+        self.pair_count = pairs.len();
         Counted::WorthIt
     }
 
     /// Gives each cell of a grid its list.
-    fn fill(&mut self, space: &Space, first: usize) -> Option<()> {
+    fn fill(&mut self, space: &Space, near: &Near, first: usize) -> Option<()> {
         let full = if self.is_last { u32::MAX } else { FULL };
         let [_, listed_from, next_from, _] = self.growing.ends();
         let all = 0..cell_count(space.resolution) as usize;
@@ -161,7 +172,18 @@ impl Divider<'_, '_, '_> {
             listed: (listed.from(listed_from), listed_from),
             next: (next.from(next_from), next_from),
         };
-        cells.list(pairs.all());
-        cells.finish(space, &mut self.source.shapes())
+        let (boxes, mut pairs) = boxes_and_pairs(pairs.rest(), cells.words.len())?;
+        cells.list(pairs.rest().get(..self.pair_count)?);
+        cells.finish(|number, _| near.box_in(space.cell(number), &boxes[number as usize]))
     }
+}
+
+/// The room for pairs in two: a box for each cell of a grid, and pairs.
+fn boxes_and_pairs(
+    room: &mut [[u32; 2]],
+    cells: usize,
+) -> Option<(&mut [Sum], List<'_, [u32; 2]>)> {
+    const PAIRS: usize = size_of::<Sum>() / size_of::<[u32; 2]>();
+    let (boxes, pairs) = room.split_at_mut_checked(PAIRS * cells)?;
+    Some((boxes.as_flattened_mut().as_chunks_mut().0, List::new(pairs)))
 }

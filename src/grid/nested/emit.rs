@@ -6,8 +6,8 @@ use super::Attempt;
 use super::grow::Grown;
 use super::lists::keep;
 use super::pack::{CHUNK, Lists, Part, Tally, Used, settle};
-use crate::block::cells::Run;
-use crate::block::leaf::TriangleBlock;
+use crate::block::cells::{GridHead, Run};
+use crate::block::leaf::{SphereBlock, TriangleBlock};
 use crate::block::{Census, Counts, Geometry, KIND_GRID, LAYOUT_COMPACT, PartsMut};
 use crate::caller::{Caller, PARTS};
 use crate::grid::list::front;
@@ -33,8 +33,9 @@ pub(super) fn emit(
     let kept_at = keep(grown.most, grown.words, grown.listed, bytes)?;
     let (front, kept) = bytes.split_at_mut(kept_at);
     let (words, listed) = view::<u32>(kept, 0, grown.words + grown.listed)?.split_at(grown.words);
-    let lists = Lists { listed, triangle_limit: census.triangle_limit };
+    let lists = Lists { listed, triangle_limit: census.triangle_limit, few: 0 };
     let tallies = Tallies::new(words, lists, caller);
+    let lists = Lists { few: tallies.all.few(census.triangle_count), ..lists };
     let runs_at = front.len().checked_sub(size_of::<Run>() * tallies.all.runs)?;
     let runs_at = runs_at / ALIGNMENT * ALIGNMENT;
     let (front, runs) = front.split_at_mut(runs_at);
@@ -51,8 +52,11 @@ pub(super) fn emit(
     let packed = packed.or_else(|| packing.pack(&tallies.together()?, &mut parts))?;
     attempt.done(1.0)?;
     let used = join_blocks(&packed, parts.triangle_blocks);
+    join_ids(&packed, &used, &mut parts);
     let (triangle_blocks, runs) = (used.triangle_blocks as u32, used.runs as u32);
-    let counts = Counts { triangle_blocks, runs, ..room };
+    let prim_ids = (used.ids[0] + used.ids[1]) as u32;
+    let counts = Counts { prim_ids, triangle_blocks, runs, ..room };
+    close_up(&room, &counts, bytes)?;
     join_runs(&packed, runs_at, &counts, caller, bytes)?;
     counts.seal(KIND_GRID, LAYOUT_COMPACT, census, bytes)
 }
@@ -106,6 +110,8 @@ fn most_counts(survey: &Survey, grown: &Grown, all: &Tally, size: usize) -> Opti
 #[derive(Clone, Copy)]
 struct Packed {
     words: usize,
+    /// Of triangles and of spheres.
+    ids_at: [usize; 2],
     triangle_blocks_at: usize,
     runs_at: usize,
     used: Used,
@@ -160,7 +166,8 @@ impl Packing<'_> {
         jobs.iter().flatten().try_for_each(|(_, _, done)| *done)?;
         Some(jobs.map(|job| {
             let (part, (triangle_blocks_at, runs_at), _) = job?;
-            Some(Packed { words: part.words.len(), triangle_blocks_at, runs_at, used: part.used })
+            let (words, ids_at, used) = (part.words.len(), part.first_ids, part.used);
+            Some(Packed { words, ids_at, triangle_blocks_at, runs_at, used })
         }))
     }
 }
@@ -175,6 +182,51 @@ fn join_blocks(packed: &[Option<Packed>; PARTS], blocks: &mut [TriangleBlock]) -
         all.add(used);
     }
     all
+}
+
+/// Moves the numbers of the parts together, as triangles that are named take none, and lets blocks name them where they now are.
+fn join_ids(packed: &[Option<Packed>; PARTS], used: &Used, parts: &mut PartsMut) {
+    let mut before = Used { ids: [0, used.ids[0]], ..Used::default() };
+    let parts_of = |kind: usize| packed.iter().flatten().map(move |part| (part, part.ids_at[kind]));
+    for (part, at) in parts_of(0) {
+        let fall = at - before.ids[0];
+        if fall > 0 {
+            parts.prim_ids.copy_within(at..at + part.used.ids[0], before.ids[0]);
+        }
+        let blocks = parts.triangle_blocks.iter_mut().skip(before.triangle_blocks);
+        blocks.take(part.used.triangle_blocks).for_each(|block| block.first -= fall as u32);
+        before.ids[0] += part.used.ids[0];
+        before.triangle_blocks += part.used.triangle_blocks;
+    }
+    for (part, at) in parts_of(1) {
+        let fall = at - before.ids[1];
+        if fall > 0 {
+            parts.prim_ids.copy_within(at..at + part.used.ids[1], before.ids[1]);
+        }
+        let blocks = parts.sphere_blocks.iter_mut().skip(before.sphere_blocks);
+        blocks.take(part.used.sphere_blocks).for_each(|block| block.first -= fall as u32);
+        before.ids[1] += part.used.ids[1];
+        before.sphere_blocks += part.used.sphere_blocks;
+    }
+}
+
+/// Moves what lies behind the numbers to where it lies in the finished block, as those are fewer than there was room for.
+fn close_up(room: &Counts, counts: &Counts, bytes: &mut [u8]) -> Option<()> {
+    let (from, to) = (room.offsets()?, counts.offsets()?);
+    for (from, to, count, size) in [
+        (from.grids, to.grids, counts.grids, size_of::<GridHead>()),
+        (from.words, to.words, counts.words, size_of::<u32>()),
+        (from.sphere_blocks, to.sphere_blocks, counts.sphere_blocks, size_of::<SphereBlock>()),
+        (
+            from.triangle_blocks,
+            to.triangle_blocks,
+            counts.triangle_blocks,
+            size_of::<TriangleBlock>(),
+        ),
+    ] {
+        bytes.copy_within(from..from + count as usize * size, to);
+    }
+    Some(())
 }
 
 /// Moves the runs of the parts behind the triangle blocks, and lets them and the words name what is where it now is.

@@ -62,8 +62,9 @@ impl Cells<'_> {
         }
     }
 
-    /// Ends the lists that stay, each with the box of its cell before it, and writes the words.
-    pub fn finish(&mut self, space: &Space, shapes: &mut Shapes) -> Option<()> {
+    /// Ends the lists that stay, each with the box of its cell before it, which `box_of` finds by the cell's number and its list, and
+    /// writes the words.
+    pub fn finish(&mut self, mut box_of: impl FnMut(u32, &[u32]) -> CellBox) -> Option<()> {
         // Each word holds the end of its list, which is where the box before the next one is.
         let (listed, first) = &mut self.listed;
         let mut start = *first;
@@ -74,7 +75,7 @@ impl Cells<'_> {
             }
             let end = *word as usize;
             let (place, list) = listed[start - *first..end - *first].split_first_chunk_mut()?;
-            *place = box_in(space, space.cell(number), shapes, list).words();
+            *place = box_of(number, list).words();
             *list.last_mut()? |= END;
             *word = box_word(start as u32);
             start = end;

@@ -41,7 +41,7 @@ pub(super) fn grow(
     let mut heads = [None; 2];
     if !large.ids().is_empty() {
         let first_word = large_cell(&large, &mut room.growing)?;
-        heads[0] = Some(Space::over(&large.bounds[0], [1; 3]).head(first_word, 1));
+        heads[0] = Some(Space::over(&large.bounds(), [1; 3]).head(first_word, 1));
     }
     let count = census.hittable() - large.ids().len() as u32;
     if count > 0 {

@@ -4,7 +4,7 @@ use crate::block::Census;
 use crate::block::leaf::TRIANGLES_AT_LEAST;
 use crate::caller::Caller;
 use crate::math::{Aabb, wide};
-use crate::prim::{GRAIN, Prim, for_each_prim_in};
+use crate::prim::{GRAIN, for_each_prim_in};
 use crate::scene::Scene;
 use core::ops::Range;
 
@@ -20,108 +20,87 @@ const ROUNDED: f64 = 1.0 + 1.0 / (1u64 << 22) as f64;
 #[derive(Clone, Copy)]
 pub(super) struct Large {
     ids: [u32; MOST],
-    lengths: [f64; MOST],
+    boxes: [Aabb; MOST],
     count: usize,
-    /// Around them, and around all others.
-    pub bounds: [Aabb; 2],
+    /// Around all others.
+    pub others: Aabb,
 }
 
 fn length(aabb: &Aabb) -> f64 {
     (wide(aabb.upper) - wide(aabb.lower)).max_element()
 }
 
+/// The same rounded: less work, where most are short.
+fn rounded_length(aabb: &Aabb) -> f32 {
+    let [x, y, z] = [0, 1, 2].map(|k| aabb.upper[k] - aabb.lower[k]);
+    x.max(y).max(z)
+}
+
 impl Large {
     const NONE: Self =
-        Large { ids: [0; MOST], lengths: [0.0; MOST], count: 0, bounds: [Aabb::EMPTY; 2] };
+        Large { ids: [0; MOST], boxes: [Aabb::EMPTY; MOST], count: 0, others: Aabb::EMPTY };
 
     /// Finds them: the longest, of equally long ones the first.
     pub fn find(scene: &Scene, census: &Census, caller: &Caller) -> Self {
         let least = length(&census.bounds) * LONG;
         let mut found = Large::NONE;
         if f64::from(census.longest) * ROUNDED < least {
-            found.bounds[1] = census.bounds;
+            found.others = census.bounds;
             return found;
         }
-        let long = |part: &mut Large, prim: Prim| {
-            let length = length(&prim.shape.aabb());
-            if length > least {
-                part.insert(length, prim.id);
-            }
+        let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
+        let of_part = |ids: Range<usize>| {
+            let mut part = Large::NONE;
+            let ids = ids.start as u32..ids.end as u32;
+            for_each_prim_in(scene, ids, sound, |prim| {
+                let aabb = prim.shape.aabb();
+                let is_short = f64::from(rounded_length(&aabb)) * ROUNDED < least;
+                if is_short || length(&aabb) <= least {
+                    part.others.add(&aabb);
+                } else {
+                    part.insert(prim.id, aabb);
+                }
+            });
+            part
         };
-        in_parts(scene, census, caller, long, |part| {
+        caller.for_parts(limit, caller.part_size(limit, GRAIN), of_part, |part| {
+            found.others.add(&part.others);
             for i in 0..part.count {
-                found.insert(part.lengths[i], part.ids[i]);
+                found.insert(part.ids[i], part.boxes[i]);
             }
         });
-        if found.count == 0 {
-            found.bounds[1] = census.bounds;
-            return found;
-        }
         found.ids[..found.count].sort_unstable();
-        let known = found;
-        let bound = |part: &mut Large, prim: Prim| {
-            let side = usize::from(!known.has(prim.id));
-            part.bounds[side].add(&prim.shape.aabb());
-        };
-        in_parts(scene, census, caller, bound, |part| {
-            (0..2).for_each(|side| found.bounds[side].add(&part.bounds[side]));
-        });
+        // Which of two zeros it is depends on how parts were cut.
+        found.others.lower = found.others.lower.map(|x| x + 0.0);
+        found.others.upper = found.others.upper.map(|x| x + 0.0);
         found
     }
 
-    /// Keeps the longest, in falling order.
-    fn insert(&mut self, length: f64, id: u32) {
-        let lengths = &mut self.lengths;
-        let place = lengths[..self.count].partition_point(|other| *other >= length);
-        if place == MOST {
-            return;
+    /// Keeps the longest, in falling order; what is not among these is one of the others.
+    fn insert(&mut self, id: u32, aabb: Aabb) {
+        let known = &self.boxes[..self.count];
+        let place = known.partition_point(|other| length(other) >= length(&aabb));
+        if self.count == MOST {
+            let last = if place == MOST { aabb } else { self.boxes[MOST - 1] };
+            self.others.add(&last);
         }
         self.count = (self.count + 1).min(MOST);
-        lengths[place..self.count].rotate_right(1);
-        self.ids[place..self.count].rotate_right(1);
-        (lengths[place], self.ids[place]) = (length, id);
+        if place < MOST {
+            self.boxes[place..self.count].rotate_right(1);
+            self.ids[place..self.count].rotate_right(1);
+            (self.boxes[place], self.ids[place]) = (aabb, id);
+        }
     }
 
-    /// Whether a primitive is one of them.
-    pub fn has(&self, id: u32) -> bool {
-        self.ids().binary_search(&id).is_ok()
+    /// The box around them.
+    pub fn bounds(&self) -> Aabb {
+        let mut bounds = Aabb::EMPTY;
+        self.boxes[..self.count].iter().for_each(|aabb| bounds.add(aabb));
+        bounds
     }
 
     /// Their numbers, rising.
     pub fn ids(&self) -> &[u32] {
         &self.ids[..self.count]
     }
-}
-
-/// Gives `take` what `work` makes of the primitives of each part, in order.
-fn in_parts(
-    scene: &Scene,
-    census: &Census,
-    caller: &Caller,
-    work: impl Fn(&mut Large, Prim) + Sync,
-    take: impl FnMut(Large),
-) {
-    let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
-    let made = |ids: Range<usize>| {
-        let mut part = Large::NONE;
-        let ids = ids.start as u32..ids.end as u32;
-        for_each_prim_in(scene, ids, sound, |prim| work(&mut part, prim));
-        part
-    };
-    caller.for_parts(limit, caller.part_size(limit, GRAIN), made, take);
-}
-
-/// All others with these numbers.
-pub(super) fn for_each_other(
-    scene: &Scene,
-    census: &Census,
-    large: &Large,
-    ids: Range<u32>,
-    mut f: impl FnMut(Prim),
-) {
-    for_each_prim_in(scene, ids, census.ignored_count == 0, |prim| {
-        if large.ids().is_empty() || !large.has(prim.id) {
-            f(prim);
-        }
-    });
 }

@@ -109,6 +109,7 @@ impl<'r> Levels<'r> {
             is_last,
             list,
             growing,
+            pair_count: 0,
             most,
             total,
             peak: total,

@@ -1,5 +1,6 @@
 //! The memory in which a nested grid grows: lists of primitives, words, and cells that wait.
 
+use super::cost::FULL;
 use super::growing::Growing;
 use crate::block::{Counts, Geometry};
 use crate::grid::list::List;
@@ -22,7 +23,7 @@ const BYTES_A_REF: u64 =
 const WORD_PER_REFS: u64 = 2;
 const WORDS_AT_LEAST: u64 = 256;
 /// A cell waits with so many numbers at least.
-const WAITING_PER_REFS: u64 = 16;
+const WAITING_PER_REFS: u64 = FULL as u64;
 const WAITING_BYTES: u64 = size_of::<Record>() as u64;
 
 /// A full cell that waits to be divided.

@@ -16,6 +16,7 @@ mod levels;
 mod lists;
 mod outermost;
 mod pack;
+mod recent;
 
 use super::options::GridOptions;
 use super::space::Space;

@@ -1,9 +1,9 @@
 //! The grid that all but large primitives are in.
 
 use super::cost::{self, FULL};
-use super::fill::{Cells, make_room};
+use super::fill::{Cells, box_in, make_room};
 use super::growing::Growing;
-use super::large::{Large, for_each_other};
+use super::large::Large;
 use super::lists::Room;
 use super::{TRIES, WORK};
 use crate::block::Census;
@@ -12,6 +12,7 @@ use crate::caller::{Caller, PARTS};
 use crate::grid::list::List;
 use crate::grid::near::Near;
 use crate::grid::options::GridOptions;
+use crate::grid::sixteen::{Sixteen, for_each_sixteen};
 use crate::grid::space::Space;
 use crate::prim::{GRAIN, Source};
 use crate::scene::Scene;
@@ -42,11 +43,12 @@ struct Part<'p> {
 }
 
 impl Part<'_> {
-    /// Counts what was looked at, unless that is too much.
-    fn take(&mut self, near: &mut Near, most: u64) {
+    /// Counts primitives, unless it has become too much.
+    #[inline(always)]
+    fn take(&mut self, sixteen: &Sixteen, near: &Near, large: &[u32], most: u64) {
         let Part { counts, pairs, work, fits, .. } = self;
         if *fits && *work <= most {
-            *work += near.take(|cell, id| {
+            *work += near.find(sixteen, large, |cell, id, _| {
                 counts[cell] += 1;
                 *fits &= pairs.push([cell as u32, id]).is_some();
             });
@@ -61,7 +63,7 @@ impl Outermost<'_, '_> {
         let ends = growing.ends();
         (0..TRIES).find_map(|coarser| {
             growing.shrink_to(ends);
-            let bounds = &self.large.bounds[1];
+            let bounds = &self.large.others;
             let resolution = cost::outer(bounds, self.options, self.count, coarser);
             let space = Space::over(bounds, resolution);
             let cells = cell_count(space.resolution) as usize;
@@ -134,14 +136,12 @@ impl Outermost<'_, '_> {
     }
 
     fn count_part(&self, space: &Space, part: &mut Part) {
-        let (most, mut near) = (WORK * self.most, Near::new(space));
+        let (most, near, large) = (WORK * self.most, Near::new(space), self.large.ids());
         part.counts.fill(0);
-        for_each_other(self.scene, self.census, self.large, part.ids.clone(), |prim| {
-            if near.push(prim.id, &prim.shape) {
-                part.take(&mut near, most);
-            }
+        let ids = part.ids.start as usize..part.ids.end as usize;
+        for_each_sixteen(self.scene, ids, self.census.ignored_count == 0, |sixteen| {
+            part.take(sixteen, &near, large, most);
         });
-        part.take(&mut near, most);
     }
 
     /// Gives each cell its list. Each thread fills those of some cells, and looks at all pairs for that.
@@ -187,7 +187,8 @@ impl Outermost<'_, '_> {
         caller.for_each(&mut jobs, |job| {
             if let Some((cells, done)) = job {
                 cells.list(pairs);
-                *done = cells.finish(space, &mut source.shapes());
+                let mut shapes = source.shapes();
+                *done = cells.finish(|cell, ids| box_in(space, space.cell(cell), &mut shapes, ids));
             }
         });
         jobs.iter().flatten().try_for_each(|(_, done)| *done)

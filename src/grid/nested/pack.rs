@@ -1,13 +1,28 @@
 //! Packs the lists of some words into leaf blocks and runs.
 
 use super::lists::{BOX_WORDS, END};
+use super::recent::{Recent, TOGETHER};
 use crate::block::cells::{Cell, CellBox, LAST, Run, box_word, cell, run_word};
-use crate::block::leaf::{KIND_SPHERES, SPHERES, SphereBlock, TRIANGLES, TriangleBlock, block_ref};
-use crate::prim::{Packer, Shapes, Source};
+use crate::block::leaf::{
+    KIND_SPHERES, KIND_TRIANGLES, SPHERES, SphereBlock, TriangleBlock, block_ref,
+};
+use crate::prim::{Packer, Shape, Shapes, Source};
 
 /// So many words begin with blocks of their own: whatever is in other words, theirs are packed alike, and on any thread. On average that leaves
 /// half a block free.
 pub(super) const CHUNK: usize = 1 << 11;
+
+/// However few of a list a block must hold for them not to be stored again, these are enough only if they are not alone.
+const ENOUGH_AT_LEAST: usize = 2;
+
+/// Where leaf blocks come to more bytes than this for each triangle, if every cell has its own, less is enough.
+const MUCH: u64 = 60;
+
+/// The entries that the run of a list can have: a box, and one for each block, which holds two or is of a kind the first,
+/// the last, or being filled when some numbers are looked at together.
+fn most_runs(len: usize) -> usize {
+    (1 + len).min(6 + len / ENOUGH_AT_LEAST + 2 * (len / TOGETHER))
+}
 
 /// How much some words list.
 #[derive(Clone, Copy, Default)]
@@ -26,6 +41,8 @@ pub(super) struct Lists<'s> {
     pub listed: &'s [u32],
     /// Numbers below are triangles.
     pub triangle_limit: u32,
+    /// Blocks with fewer triangles than this on average would take [`MUCH`] memory.
+    pub few: u64,
 }
 
 impl Lists<'_> {
@@ -51,8 +68,7 @@ impl Lists<'_> {
                 let round = list.iter().filter(is_sphere).count();
                 tally.triangles += list.len() - round;
                 spheres += round;
-                // A box, and one for each block, of which the second and later ones hold five or are the last; of triangles and of spheres.
-                tally.runs += list.len().min(4 + list.len() / 5);
+                tally.runs += most_runs(list.len());
             }
             tally.spheres += spheres;
             tally.sphere_blocks += spheres.div_ceil(SPHERES);
@@ -62,6 +78,11 @@ impl Lists<'_> {
 }
 
 impl Tally {
+    /// With fewer triangles in a block it would be [`MUCH`] memory for `count` triangles.
+    pub fn few(&self, count: u32) -> u64 {
+        size_of::<TriangleBlock>() as u64 * self.triangles as u64 / (MUCH * u64::from(count.max(1)))
+    }
+
     pub fn add(&mut self, other: &Tally) {
         self.triangles += other.triangles;
         self.spheres += other.spheres;
@@ -112,6 +133,7 @@ impl Part<'_> {
         let [triangle_ids, sphere_ids] = &mut self.ids;
         let mut emitter = Emitter {
             shapes: source.shapes(),
+            corners: [[[0.0; 3]; 3]; TOGETHER],
             packer: Packer::new(
                 self.triangle_blocks.get_mut(triangle_blocks..)?,
                 self.sphere_blocks.get_mut(sphere_blocks..)?,
@@ -121,32 +143,23 @@ impl Part<'_> {
             blocks: [triangle_blocks as u32, sphere_blocks as u32],
             ids: [triangle_ids.get_mut(triangle..)?, sphere_ids.get_mut(sphere..)?],
             id_counts: [0; 2],
-            open: (u32::MAX, [u32::MAX; TRIANGLES]),
+            recent: Recent::NONE,
+            few: lists.few,
             runs: self.runs,
             run_count: runs,
         };
-        let mut listed = [0; 2];
         for word in self.words.chunks_mut(CHUNK).nth(chunk)? {
             let Some((list, cell_box)) = lists.of(*word) else { continue };
-            let first = match cell_box {
+            *word = match cell_box {
                 Some(cell_box) => box_word(emitter.cell_box(cell_box)?),
                 None => run_word(emitter.run_count as u32),
             };
-            *word = first;
-            let before = emitter.id_counts;
             emitter.list(list)?;
-            let spheres = emitter.id_counts[1] - before[1];
-            listed = [listed[0] + list.len() - spheres, listed[1] + spheres];
         }
-        let Emitter { packer, ids, id_counts, run_count, .. } = emitter;
-        // Numbers of triangles that were in the open block when they were listed again.
-        ids.into_iter().zip(id_counts).zip(listed).try_for_each(|((ids, from), to)| {
-            ids.get_mut(from..to)?.fill(0);
-            Some(())
-        })?;
+        let Emitter { packer, id_counts, run_count, .. } = emitter;
         self.used = Used {
-            ids: [triangle + listed[0], sphere + listed[1]],
-            sphere_blocks: sphere_blocks + listed[1].div_ceil(SPHERES),
+            ids: [triangle + id_counts[0], sphere + id_counts[1]],
+            sphere_blocks: sphere_blocks + packer.sphere_block_count(),
             triangle_blocks: triangle_blocks + packer.triangle_block_count(),
             runs: run_count,
         };
@@ -157,14 +170,17 @@ impl Part<'_> {
 /// What a chunk is packed to.
 struct Emitter<'s, 'a, 'b> {
     shapes: Shapes<'s, 'a>,
+    /// The corners of what is packed next.
+    corners: [[[f32; 3]; 3]; TOGETHER],
     packer: Packer<'b>,
+    recent: Recent,
+    /// See [`Lists::few`].
+    few: u64,
     /// So many blocks of triangles and of spheres are before those of the packer.
     blocks: [u32; 2],
     /// The numbers of triangles and of spheres, and how many there are.
     ids: [&'b mut [u32]; 2],
     id_counts: [usize; 2],
-    /// The triangle block being filled, and whose are its lanes.
-    open: (u32, [u32; TRIANGLES]),
     runs: &'b mut [Run],
     run_count: usize,
 }
@@ -179,45 +195,97 @@ impl Emitter<'_, '_, '_> {
 
     /// Packs a list.
     ///
-    /// A primitive is stored again for each cell that lists it, unless the block being filled holds it already.
+    /// A triangle is stored again for each cell that lists it, unless a block that was filled a moment ago holds it beside enough others of
+    /// the list.
     fn list(&mut self, list: &[u32]) -> Option<()> {
         let first = self.run_count;
-        for id in list {
-            let (block, lane) = self.pack(id & !END)?;
-            let is_same =
-                self.run_count > first && self.runs.get(self.run_count - 1)?.block == block;
-            if !is_same {
-                *self.runs.get_mut(self.run_count)? = Run { block, lanes: 0 };
-                self.run_count += 1;
-            }
-            self.runs.get_mut(self.run_count - 1)?.lanes |= 1 << lane;
+        for ids in list.chunks(TOGETHER) {
+            self.list_some(ids, first)?;
         }
         self.runs.get_mut(self.run_count - 1)?.lanes |= LAST;
         Some(())
     }
 
-    /// The block and the lane of a primitive: where it is in the open block, or a new place.
-    fn pack(&mut self, id: u32) -> Option<(u32, u32)> {
-        let (open, ids) = &mut self.open;
-        if let Some(lane) = ids.iter().position(|other| *other == id) {
-            return Some((*open, lane as u32));
+    /// The same of some of its numbers; its first run is `first`.
+    #[inline]
+    fn list_some(&mut self, ids: &[u32], first: usize) -> Option<()> {
+        let open = (self.packer.triangle_block_count() as u32).wrapping_sub(1);
+        let mut held = self.recent.hold(ids, open);
+        held.keep(self.enough(), |age, lanes| {
+            let block = block_ref(KIND_TRIANGLES, self.blocks[0] + open - age);
+            self.name(block, lanes, first)
+        })?;
+        let (left, count) = held.left(ids);
+        let left = left.get(..count)?;
+        let triangles = self.look_up(left)?;
+        for (i, id) in left.iter().enumerate() {
+            let (block, lane) = match i < triangles {
+                true => self.pack_triangle(id & !END, self.corners[i % TOGETHER])?,
+                false => self.pack_sphere(id & !END)?,
+            };
+            self.name(block, 1 << lane, first)?;
         }
-        let (block, lane) = match self.shapes.corners(id) {
-            Some(corners) => self.packer.push_triangle(corners)?,
-            None => self.packer.push(&self.shapes.get(id)?)?,
-        };
-        let is_sphere = block >= block_ref(KIND_SPHERES, 0);
-        let block = block + self.blocks[usize::from(is_sphere)];
-        if !is_sphere {
-            if block != *open {
-                (*open, *ids) = (block, [u32::MAX; TRIANGLES]);
-            }
-            *ids.get_mut(lane as usize)? = id;
+        Some(())
+    }
+
+    /// How many of a list a block must hold for them not to be stored again: half of what has filled a block so far, or a quarter
+    /// where memory is dear.
+    #[inline]
+    fn enough(&self) -> u32 {
+        let (stored, blocks) = (self.id_counts[0], self.packer.triangle_block_count().max(1));
+        let part = if (stored as u64) < self.few * blocks as u64 { 4 } else { 2 };
+        ((stored + part / 2 * blocks) / (part * blocks)).max(ENOUGH_AT_LEAST) as u32
+    }
+
+    /// Lets the run that begins at `first` name lanes of a block.
+    #[inline]
+    fn name(&mut self, block: u32, lanes: u32, first: usize) -> Option<()> {
+        if self.run_count == first || self.runs.get(self.run_count - 1)?.block != block {
+            *self.runs.get_mut(self.run_count)? = Run { block, lanes: 0 };
+            self.run_count += 1;
         }
-        let next = &mut self.id_counts[usize::from(is_sphere)];
-        *self.ids[usize::from(is_sphere)].get_mut(*next)? = id;
-        *next += 1;
-        Some((block, lane))
+        self.runs.get_mut(self.run_count - 1)?.lanes |= lanes;
+        Some(())
+    }
+
+    /// Brings the corners of triangles, which come before spheres; returns how many these are. All at once, as nothing then waits for
+    /// each of them.
+    #[inline]
+    fn look_up(&mut self, ids: &[u32]) -> Option<usize> {
+        for (i, (id, corners)) in ids.iter().zip(&mut self.corners).enumerate() {
+            let id = id & !END;
+            *corners = match self.shapes.corners(id) {
+                Some(corners) => corners,
+                None => match self.shapes.get(id)? {
+                    Shape::Triangle(corners) => corners,
+                    Shape::Sphere { .. } | Shape::Box(_) => return Some(i),
+                },
+            };
+        }
+        Some(ids.len())
+    }
+
+    /// Packs a triangle; returns the block and the lane.
+    #[inline]
+    fn pack_triangle(&mut self, id: u32, corners: [[f32; 3]; 3]) -> Option<(u32, u32)> {
+        let (block, lane) = self.packer.push_triangle(corners)?;
+        self.recent.put(id, block - block_ref(KIND_TRIANGLES, 0), lane);
+        self.write_id(id, 0)?;
+        Some((block + self.blocks[0], lane))
+    }
+
+    /// The same of what is no triangle.
+    fn pack_sphere(&mut self, id: u32) -> Option<(u32, u32)> {
+        let (block, lane) = self.packer.push(&self.shapes.get(id)?)?;
+        self.write_id(id, 1)?;
+        Some((block + self.blocks[1], lane))
+    }
+
+    #[inline]
+    fn write_id(&mut self, id: u32, kind: usize) -> Option<()> {
+        *self.ids[kind].get_mut(self.id_counts[kind])? = id;
+        self.id_counts[kind] += 1;
+        Some(())
     }
 }
 
