@@ -1,7 +1,7 @@
 //! Where to part the refs of a large node: SAH over bins.
 
 use super::refs::PrimRef;
-use super::split::{Areas, Box4, centre, greater, lesser, middle};
+use super::split::{Areas, Box4, middle};
 use crate::simd::SMALL;
 
 /// Bins along each axis at most.
@@ -78,12 +78,15 @@ struct Binning {
     lower: [f32; 4],
     scale: [f32; 4],
     bins: usize,
-    /// The last bin.
-    last: f32,
 }
 
-/// Above 2^23 the lowest bits of a float are those of an integer.
-const INTEGER: f32 = (1 << 23) as f32;
+/// From 2^23 to 2^24 the lowest bits of a float are those of an integer; this is the middle, so that half a bin less is
+/// among them.
+const INTEGER: f32 = (3 << 22) as f32;
+
+/// So that the last centre, half a bin before the end, is rounded down: more than what the roundings of scale and place
+/// can add.
+const BELOW: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
 impl Binning {
     fn new(centres: &Box4, count: usize, most: usize) -> Self {
@@ -91,20 +94,20 @@ impl Binning {
         let bins = (4 + count / 8).min(most);
         let mut scale = [0.0; 4];
         for ((scale, upper), lower) in scale.iter_mut().zip(centres.upper).zip(centres.lower) {
-            *scale = bins as f32 / (upper - lower);
+            *scale = bins as f32 * BELOW / (upper - lower);
         }
-        Binning { lower: centres.lower, scale, bins, last: (bins - 1) as f32 }
+        Binning { lower: centres.lower, scale, bins }
     }
 
-    /// The bins on the three axes.
+    /// The bins on the three axes of a ref whose centre is in the box.
     #[inline(always)]
     fn bins_of(&self, r: &PrimRef) -> [usize; 3] {
-        let centre = centre(r);
-        let mut at = [0.0; 4];
+        let Box4 { lower, upper } = &r.bounds;
+        let mut at = [0; 4];
         for k in 0..4 {
-            at[k] = self.place(centre[k], k);
+            at[k] = self.place(middle(lower[k], upper[k]), k).to_bits() % BINS as u32;
         }
-        let [x, y, z, _] = at.map(|at| at.to_bits() as usize % BINS);
+        let [x, y, z, _] = at.map(|at| at as usize);
         [x, y, z]
     }
 
@@ -115,12 +118,12 @@ impl Binning {
         self.place(middle(lower[k], upper[k]), k).to_bits() as usize % BINS
     }
 
-    /// The bin on axis `k`, above [`INTEGER`]. NaN, from infinite boxes or an axis without extent, goes to bin 0:
-    /// everything is in some bin.
+    /// The bin on axis `k`, above [`INTEGER`]. Not clamped, as compilers make branches of that, which are guessed wrong: what
+    /// is in the box is in a bin. The lowest bits of infinity and NaN, from infinite boxes or an axis without extent, are those of
+    /// bin 0.
     #[inline(always)]
     fn place(&self, centre: f32, k: usize) -> f32 {
-        let at = (centre - self.lower[k]) * self.scale[k] - 0.5;
-        lesser(greater(at, 0.0), self.last) + INTEGER
+        (centre - self.lower[k]) * self.scale[k] - 0.5 + INTEGER
     }
 }
 
@@ -143,7 +146,8 @@ impl Plane {
             let (before, from) = refs.split_at_mut(i);
             let Some(r) = from.first_mut() else { break };
             let Box4 { lower, upper } = &r.bounds;
-            let left = self.binning.place(middle(lower[k], upper[k]), k) < right;
+            // NaN is left.
+            let left = !(self.binning.place(middle(lower[k], upper[k]), k) >= right);
             // None when all so far are left.
             if let Some(place) = before.get_mut(count) {
                 core::mem::swap(place, r);
