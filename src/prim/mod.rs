@@ -9,6 +9,7 @@ mod refit;
 mod shapes;
 mod validate;
 mod visit;
+mod whole;
 
 pub(crate) use gather::{GRAIN, Shape, Survey, box_around, geometries, geometry_table, survey};
 pub(crate) use names::Names;
@@ -21,6 +22,7 @@ pub(crate) use validate::leaves_are_sound;
 pub(crate) use visit::{
     Prim, Visitor, for_each_counted, for_each_named_in, for_each_prim_in, visit,
 };
+pub(crate) use whole::BlockWriter;
 
 use crate::block::Block;
 use crate::block::leaf::{
