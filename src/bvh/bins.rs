@@ -18,8 +18,8 @@ pub(crate) struct Effort {
     pub whole: bool,
     /// Triangles at most that go as one, each with an edge of the one before.
     pub strip: usize,
-    /// Whether leaves of even scenes are runs of refs along a curve.
-    pub runs: bool,
+    /// Whether leaves are leaf blocks at once: runs of refs along a curve where scenes are even, else what fits.
+    pub blocks: bool,
     /// Above this unevenness of the refs more is done.
     even: f64,
     /// Whether refs may then be cut in two.
@@ -27,13 +27,13 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    pub const FAST: Effort = Effort { strip: 4, runs: true, ..Effort::BALANCED };
+    pub const FAST: Effort = Effort { strip: 4, blocks: true, ..Effort::BALANCED };
     pub const BALANCED: Effort = Effort {
         bins: 16,
         samples: 512,
         whole: true,
         strip: 2,
-        runs: false,
+        blocks: false,
         even: 64.0,
         cuts: false,
     };
@@ -45,7 +45,7 @@ impl Effort {
         samples: ALL,
         whole: false,
         strip: 1,
-        runs: false,
+        blocks: false,
         even: 4.0,
         cuts: true,
     };
@@ -174,25 +174,28 @@ impl Bins {
         Bins([const { Axis { bounds: [Box4::ZERO; BINS], counts: [0; BINS] } }; AXES]);
 }
 
-/// The best split by bins of the box around the centres, or `None` when all fall into one.
+/// The best split by bins of the box around the centres, or `None` when all fall into one. With `one_axis`, only the axis
+/// along which these are furthest apart is looked at.
 ///
 /// Source: \[Wald07\].
 pub(crate) fn best_plane(
     refs: &[PrimRef],
     centres: &Box4,
     areas: Areas,
-    effort: Effort,
+    (effort, one_axis): (Effort, bool),
     Bins(axes): &mut Bins,
 ) -> Option<Plane> {
     let binning = Binning::new(centres, refs.len(), effort.bins);
     let sample = refs.iter().step_by(effort.step(refs.len()).max(1));
-    if !SMALL {
+    let one_by_one = SMALL || one_axis;
+    if !one_by_one {
         fill(axes, &binning, sample.clone());
     }
     let mut best = (f32::INFINITY, 0, 0);
-    for k in 0..3 {
+    let widest = centres.widest();
+    for k in if one_axis { widest..widest + 1 } else { 0..3 } {
         let Some(axis) = axes.get_mut(k % AXES) else { break };
-        if SMALL {
+        if one_by_one {
             axis.fill(&binning, k, sample.clone());
         }
         let (work, bin) = axis.best(binning.bins, areas);

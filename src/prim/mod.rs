@@ -2,6 +2,7 @@
 
 mod census;
 mod gather;
+mod known;
 mod names;
 mod numbers;
 mod pack;
@@ -12,6 +13,7 @@ mod visit;
 mod whole;
 
 pub(crate) use gather::{GRAIN, Shape, Survey, box_around, geometries, geometry_table, survey};
+pub(crate) use known::Known;
 pub(crate) use names::Names;
 pub(crate) use names::digest;
 pub(crate) use numbers::{Numbers, Vertices};

@@ -1,5 +1,6 @@
 //! Fills leaf blocks whose triangles are chosen, and fit.
 
+use super::known::Known;
 use super::numbers::Numbers;
 use super::shapes::Shapes;
 use crate::block::leaf::{TRIANGLES, TriangleBlock, corner_shift, low_bits};
@@ -72,38 +73,66 @@ impl<'s, 'a> BlockWriter<'s, 'a> {
     }
 }
 
-/// The vertices of a block by their numbers in meshes: a table that forgets what another vertex takes the place of.
-struct Known {
-    /// Mesh and number, and the block with the number in it.
-    entries: [(u64, u64); 64],
-    /// Counts blocks, from 1 on.
-    block: u64,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prim::{Packer, Source, geometry_table};
+    use crate::scene::{Mesh, Scene};
+    use std::vec::Vec;
 
-impl Known {
-    const NOTHING: Known = Known { entries: [(0, 0); 64], block: 0 };
-
-    /// Begins another block.
-    fn forget(&mut self) {
-        self.block += 1;
+    /// The block that a writer makes of these triangles of a scene, after one of others; and that of a packer.
+    fn blocks_of(scene: &Scene, ids: &[u32]) -> [Option<TriangleBlock>; 2] {
+        let geometries: Vec<_> = geometry_table(scene).collect();
+        let source = Source { scene, geometries: &geometries, named: false };
+        let mut writer = BlockWriter::new(source.shapes());
+        let mut block = TriangleBlock::EMPTY;
+        let mut write = |ids: &[u32]| writer.write(&mut block, 7, ids, |_| None).map(|()| block);
+        write(&[3, 2, 1, 0]).expect("four triangles fit");
+        let written = write(ids);
+        let (mut packed, mut shapes) = ([TriangleBlock::EMPTY; 1], source.shapes());
+        let mut packer = Packer::new(&mut packed, &mut [], 7, 0);
+        let pushed = ids.iter().try_for_each(|id| packer.push(&shapes.get(*id)?).map(|_| ()));
+        [written, pushed.map(|()| packed[0])]
     }
 
-    #[inline(always)]
-    fn find(&self, mesh: u32, number: usize) -> Option<usize> {
-        let (vertex, place) = self.entries[number % 64];
-        let known = (vertex == name(mesh, number)) & (place / TRIANGLES as u64 == self.block);
-        known.then_some(place as usize % TRIANGLES)
+    fn words(block: &TriangleBlock) -> Vec<u32> {
+        let corners = block.aabb.lower.iter().chain(&block.aabb.upper);
+        let floats = block.vertices.iter().flatten().chain(corners);
+        let numbers = block.corners.iter().flatten().map(|n| u32::from(*n));
+        let rest = [block.first, block.count, block.live, block.reserved];
+        floats.map(|x| x.to_bits()).chain(numbers).chain(rest).collect()
     }
 
-    #[inline(always)]
-    fn learn(&mut self, mesh: u32, number: usize, v: usize) {
-        let place = self.block * TRIANGLES as u64 + v as u64;
-        self.entries[number % 64] = (name(mesh, number), place);
+    #[test]
+    fn whole_blocks_are_those_that_are_packed_one_by_one() {
+        // Vertices 64 apart want one place of the table; every fifth one has the bits of the one before.
+        let vertex = |i: u32| [(i - u32::from(i % 5 == 4)) as f32, -0.0, (i % 3) as f32];
+        let vertices: Vec<_> = (0..200).map(vertex).collect();
+        let strip: Vec<_> = (0..14).map(|i| [i, i + 1, i + 2]).collect();
+        let apart: Vec<_> = (0..8).map(|i| [64 * (i % 3), 64 * (i % 3) + 1, i]).collect();
+        let soup: Vec<_> = (0..6).map(|i| [i, i + 1, i + 3].map(vertex)).collect();
+        let meshes =
+            [Mesh::indexed(&vertices, &strip), Mesh::indexed(&vertices, &apart), Mesh::soup(&soup)];
+        let scene = Scene::new(&meshes, &[]);
+        let all: [&[u32]; 6] = [
+            &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
+            &[14, 15, 16, 17, 18, 19, 20, 21],
+            &[0, 14, 1, 15, 22, 2, 16, 23],
+            &[22, 23, 24, 25, 26, 27],
+            &[5; 16],
+            &[27],
+        ];
+        for ids in all {
+            let [written, packed] = blocks_of(&scene, ids).map(|block| block.map(|b| words(&b)));
+            assert!(written.is_some() && written == packed, "{ids:?}");
+        }
+        assert!(blocks_of(&scene, &[5; 17])[0].is_none(), "a seventeenth triangle");
+        let apart: Vec<_> =
+            (0..6).map(|i| [3 * i, 3 * i + 1, 3 * i + 2].map(|x| [x as f32; 3])).collect();
+        let meshes = [Mesh::soup(&apart)];
+        assert!(
+            blocks_of(&Scene::new(&meshes, &[]), &[0, 1, 2, 3, 4, 5])[0].is_none(),
+            "18 vertices"
+        );
     }
-}
-
-/// A vertex of all meshes; `mesh` is the first triangle of its own.
-#[inline(always)]
-fn name(mesh: u32, number: usize) -> u64 {
-    u64::from(mesh) << 32 | number as u64
 }
