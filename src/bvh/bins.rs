@@ -272,3 +272,66 @@ impl Axis {
         best
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::split::Extent;
+    use crate::math::Aabb;
+    use std::vec::Vec;
+
+    /// Refs in a part of space of this size, at this distance.
+    fn refs_of(count: u32, size: f32, distance: f32) -> Vec<PrimRef> {
+        let mut state = 7u32;
+        let mut next = || {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            distance + size * (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut at = |id| {
+            let lower = [next(), next(), next()];
+            PrimRef::new(id, &Aabb { lower, upper: lower.map(|x| x + size / 64.0) }, false)
+        };
+        (0..count).map(&mut at).collect()
+    }
+
+    #[test]
+    fn what_is_in_the_box_is_in_a_bin() {
+        let sizes = [1e-30, 1e-3, 1.0, 77.7, 1e30];
+        let places = sizes.map(|size| [(size, 0.0), (size, size), (size, -1e4 * size)]);
+        for (size, distance) in places.into_iter().flatten() {
+            for (count, most) in [(2, 16), (9, 16), (37, 16), (100, 32), (3000, 16), (3000, 32)] {
+                let mut refs = refs_of(count, size, distance);
+                let centres = Extent::around(&refs).centres;
+                let binning = Binning::new(&centres, refs.len(), most);
+                let mut counts = [[0; BINS]; 3];
+                for r in &refs {
+                    let bins = binning.bins_of(r);
+                    assert_eq!(bins, [0, 1, 2].map(|k| binning.bin_of(r, k)));
+                    (0..3).for_each(|k| counts[k][bins[k]] += 1);
+                }
+                for (axis, counts) in counts.iter().enumerate() {
+                    let used = &counts[..binning.bins];
+                    assert_eq!(used.iter().sum::<usize>(), refs.len(), "{size} {distance}");
+                    assert!(used[0] > 0 && used[binning.bins - 1] > 0, "{size} {distance}");
+                    for bin in 1..binning.bins {
+                        let left = Plane { binning, axis, bin }.part(&mut refs);
+                        assert_eq!(left, used[..bin].iter().sum::<usize>());
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_place_is_in_the_first_bin() {
+        let lower = [f32::NEG_INFINITY, 1.0, 2.0];
+        let everywhere = Aabb { lower, upper: [f32::INFINITY, 1.0, 5.0] };
+        let mut refs = [PrimRef::new(0, &everywhere, true); 12];
+        refs[3] = PrimRef::new(1, &Aabb { lower: [4.0, 1.0, 3.0], upper: [4.0, 1.0, 3.0] }, true);
+        let binning = Binning::new(&Extent::around(&refs).centres, refs.len(), 16);
+        assert!(refs.iter().all(|r| binning.bins_of(r)[..2] == [0, 0]));
+        for axis in 0..2 {
+            assert_eq!(Plane { binning, axis, bin: 1 }.part(&mut refs), refs.len());
+        }
+    }
+}
