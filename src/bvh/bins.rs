@@ -78,15 +78,13 @@ struct Binning {
     lower: [f32; 4],
     scale: [f32; 4],
     bins: usize,
+    /// The bits of the last place.
+    last: u32,
 }
 
 /// From 2^23 to 2^24 the lowest bits of a float are those of an integer; this is the middle, so that half a bin less is
 /// among them.
 const INTEGER: f32 = (3 << 22) as f32;
-
-/// So that the last centre, half a bin before the end, is rounded down: more than what the roundings of scale and place
-/// can add.
-const BELOW: f32 = 1.0 - 1.0 / (1 << 20) as f32;
 
 impl Binning {
     fn new(centres: &Box4, count: usize, most: usize) -> Self {
@@ -94,9 +92,9 @@ impl Binning {
         let bins = (4 + count / 8).min(most);
         let mut scale = [0.0; 4];
         for ((scale, upper), lower) in scale.iter_mut().zip(centres.upper).zip(centres.lower) {
-            *scale = bins as f32 * BELOW / (upper - lower);
+            *scale = bins as f32 / (upper - lower);
         }
-        Binning { lower: centres.lower, scale, bins }
+        Binning { lower: centres.lower, scale, bins, last: INTEGER.to_bits() + bins as u32 - 1 }
     }
 
     /// The bins on the three axes of a ref whose centre is in the box.
@@ -105,9 +103,9 @@ impl Binning {
         let Box4 { lower, upper } = &r.bounds;
         let mut at = [0; 4];
         for k in 0..4 {
-            at[k] = self.place(middle(lower[k], upper[k]), k).to_bits() % BINS as u32;
+            at[k] = self.place(middle(lower[k], upper[k]), k).to_bits();
         }
-        let [x, y, z, _] = at.map(|at| at as usize);
+        let [x, y, z, _] = at.map(|bits| self.bin(bits));
         [x, y, z]
     }
 
@@ -115,12 +113,18 @@ impl Binning {
     #[inline(always)]
     fn bin_of(&self, r: &PrimRef, k: usize) -> usize {
         let (k, Box4 { lower, upper }) = (k % 3, &r.bounds);
-        self.place(middle(lower[k], upper[k]), k).to_bits() as usize % BINS
+        self.bin(self.place(middle(lower[k], upper[k]), k).to_bits())
     }
 
-    /// The bin on axis `k`, above [`INTEGER`]. Not clamped, as compilers make branches of that, which are guessed wrong: what
-    /// is in the box is in a bin. The lowest bits of infinity and NaN, from infinite boxes or an axis without extent, are those of
-    /// bin 0.
+    /// The bin of a place with these bits. Those of infinity and NaN, from infinite boxes or an axis without extent, go to the
+    /// last one: everything is in some bin.
+    #[inline(always)]
+    fn bin(&self, bits: u32) -> usize {
+        bits.min(self.last) as usize % BINS
+    }
+
+    /// The bin on axis `k`, above [`INTEGER`]; the last centre may be one beyond. Not clamped, as compilers make branches of
+    /// that for floats, which are guessed wrong; below the first bin is no centre, as half a bin less is rounded to even.
     #[inline(always)]
     fn place(&self, centre: f32, k: usize) -> f32 {
         (centre - self.lower[k]) * self.scale[k] - 0.5 + INTEGER
@@ -146,8 +150,8 @@ impl Plane {
             let (before, from) = refs.split_at_mut(i);
             let Some(r) = from.first_mut() else { break };
             let Box4 { lower, upper } = &r.bounds;
-            // NaN is left.
-            let left = !(self.binning.place(middle(lower[k], upper[k]), k) >= right);
+            // NaN is right, as it is in the last bin.
+            let left = self.binning.place(middle(lower[k], upper[k]), k) < right;
             // None when all so far are left.
             if let Some(place) = before.get_mut(count) {
                 core::mem::swap(place, r);
@@ -323,15 +327,16 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_place_is_in_the_first_bin() {
+    fn what_has_no_place_is_in_the_last_bin() {
         let lower = [f32::NEG_INFINITY, 1.0, 2.0];
         let everywhere = Aabb { lower, upper: [f32::INFINITY, 1.0, 5.0] };
         let mut refs = [PrimRef::new(0, &everywhere, true); 12];
         refs[3] = PrimRef::new(1, &Aabb { lower: [4.0, 1.0, 3.0], upper: [4.0, 1.0, 3.0] }, true);
         let binning = Binning::new(&Extent::around(&refs).centres, refs.len(), 16);
-        assert!(refs.iter().all(|r| binning.bins_of(r)[..2] == [0, 0]));
+        let last = binning.bins - 1;
+        assert!(refs.iter().all(|r| binning.bins_of(r)[..2] == [last; 2]));
         for axis in 0..2 {
-            assert_eq!(Plane { binning, axis, bin: 1 }.part(&mut refs), refs.len());
+            assert_eq!(Plane { binning, axis, bin: last }.part(&mut refs), 0);
         }
     }
 }

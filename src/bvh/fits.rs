@@ -16,7 +16,7 @@ impl<'s, 'a> Fits<'s, 'a> {
     }
 
     /// Whether the triangles of these refs fit into one block. What has other numbers counts as another vertex.
-    pub fn into_a_block(&mut self, refs: &[PrimRef]) -> bool {
+    pub fn are_a_block(&mut self, refs: &[PrimRef]) -> bool {
         let triangles = refs.iter().map(PrimRef::count).sum::<usize>();
         if triangles > TRIANGLES || refs.iter().any(PrimRef::is_sphere) {
             return false;
@@ -139,7 +139,7 @@ mod tests {
                     r
                 })
                 .collect();
-            fits.into_a_block(&refs)
+            fits.are_a_block(&refs)
         };
         for _ in 0..2 {
             assert!(fit(0..14, 1, false) && !fit(0..15, 1, false), "16 and 17 vertices");

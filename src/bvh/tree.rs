@@ -199,7 +199,7 @@ impl Splitter<'_, '_, '_> {
         let (left, right) = refs.split_at_checked(split.counts[0]).unwrap_or((refs, &[]));
         let [left, right] =
             [split.sides[0].extent(left, 1), split.sides[1].extent(right, 1)].map(|e| area(&e));
-        area(extent) <= left + right && fits.into_a_block(refs)
+        area(extent) <= left + right && fits.are_a_block(refs)
     }
 
     /// Parts the refs of a node in two, or decides for a leaf.
