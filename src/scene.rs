@@ -131,6 +131,12 @@ impl<'a> Mesh<'a> {
         Some([corner(a)?, corner(b)?, corner(c)?])
     }
 
+    /// Vertex `v`, if there is one.
+    #[inline]
+    pub(crate) fn vertex(&self, v: usize) -> Option<[f32; 3]> {
+        self.vertices.get::<3>(v)
+    }
+
     /// The numbers of the vertices of triangle `i`, which need not exist. There may be more indices or vertices than
     /// triangles use.
     #[inline]

@@ -93,8 +93,14 @@ impl TriangleBlock {
 /// The byte of triangle `i < 16` in a list of corners, and the bits below its nibble.
 #[inline(always)]
 fn nibble(i: usize) -> (usize, usize) {
-    let place = i % 2 * 8 + i / 2 % 8;
-    (place / 2, 4 * (place % 2))
+    let shift = corner_shift(i);
+    (shift / 8, shift % 8)
+}
+
+/// The bits below the number of triangle `i < 16`, where a list of corners is one word, its first byte lowest.
+#[inline(always)]
+pub(crate) fn corner_shift(i: usize) -> usize {
+    4 * (i % 2 * 8 + i / 2 % 8)
 }
 
 /// Up to 15 spheres.

@@ -1,7 +1,7 @@
 //! Where to part the refs of a large node: SAH over bins.
 
 use super::refs::PrimRef;
-use super::split::{Areas, Box4, centre, greater, lesser, middle};
+use super::split::{Areas, Box4, middle};
 use crate::simd::SMALL;
 
 /// Bins along each axis at most.
@@ -18,8 +18,8 @@ pub(crate) struct Effort {
     pub whole: bool,
     /// Triangles at most that go as one, each with an edge of the one before.
     pub strip: usize,
-    /// Whether leaves of even scenes are runs of refs along a curve.
-    pub runs: bool,
+    /// Whether leaves are leaf blocks at once: runs of refs along a curve where scenes are even, else what fits.
+    pub blocks: bool,
     /// Above this unevenness of the refs more is done.
     even: f64,
     /// Whether refs may then be cut in two.
@@ -27,13 +27,13 @@ pub(crate) struct Effort {
 }
 
 impl Effort {
-    pub const FAST: Effort = Effort { strip: 4, runs: true, ..Effort::BALANCED };
+    pub const FAST: Effort = Effort { strip: 4, blocks: true, ..Effort::BALANCED };
     pub const BALANCED: Effort = Effort {
         bins: 16,
         samples: 512,
         whole: true,
         strip: 2,
-        runs: false,
+        blocks: false,
         even: 64.0,
         cuts: false,
     };
@@ -45,7 +45,7 @@ impl Effort {
         samples: ALL,
         whole: false,
         strip: 1,
-        runs: false,
+        blocks: false,
         even: 4.0,
         cuts: true,
     };
@@ -78,12 +78,13 @@ struct Binning {
     lower: [f32; 4],
     scale: [f32; 4],
     bins: usize,
-    /// The last bin.
-    last: f32,
+    /// The bits of the last place.
+    last: u32,
 }
 
-/// Above 2^23 the lowest bits of a float are those of an integer.
-const INTEGER: f32 = (1 << 23) as f32;
+/// From 2^23 to 2^24 the lowest bits of a float are those of an integer; this is the middle, so that half a bin less is
+/// among them.
+const INTEGER: f32 = (3 << 22) as f32;
 
 impl Binning {
     fn new(centres: &Box4, count: usize, most: usize) -> Self {
@@ -93,18 +94,18 @@ impl Binning {
         for ((scale, upper), lower) in scale.iter_mut().zip(centres.upper).zip(centres.lower) {
             *scale = bins as f32 / (upper - lower);
         }
-        Binning { lower: centres.lower, scale, bins, last: (bins - 1) as f32 }
+        Binning { lower: centres.lower, scale, bins, last: INTEGER.to_bits() + bins as u32 - 1 }
     }
 
-    /// The bins on the three axes.
+    /// The bins on the three axes of a ref whose centre is in the box.
     #[inline(always)]
     fn bins_of(&self, r: &PrimRef) -> [usize; 3] {
-        let centre = centre(r);
-        let mut at = [0.0; 4];
+        let Box4 { lower, upper } = &r.bounds;
+        let mut at = [0; 4];
         for k in 0..4 {
-            at[k] = self.place(centre[k], k);
+            at[k] = self.place(middle(lower[k], upper[k]), k).to_bits();
         }
-        let [x, y, z, _] = at.map(|at| at.to_bits() as usize % BINS);
+        let [x, y, z, _] = at.map(|bits| self.bin(bits));
         [x, y, z]
     }
 
@@ -112,15 +113,21 @@ impl Binning {
     #[inline(always)]
     fn bin_of(&self, r: &PrimRef, k: usize) -> usize {
         let (k, Box4 { lower, upper }) = (k % 3, &r.bounds);
-        self.place(middle(lower[k], upper[k]), k).to_bits() as usize % BINS
+        self.bin(self.place(middle(lower[k], upper[k]), k).to_bits())
     }
 
-    /// The bin on axis `k`, above [`INTEGER`]. NaN, from infinite boxes or an axis without extent, goes to bin 0:
-    /// everything is in some bin.
+    /// The bin of a place with these bits. Those of infinity and NaN, from infinite boxes or an axis without extent, go to the
+    /// last one: everything is in some bin.
+    #[inline(always)]
+    fn bin(&self, bits: u32) -> usize {
+        bits.min(self.last) as usize % BINS
+    }
+
+    /// The bin on axis `k`, above [`INTEGER`]; the last centre may be one beyond. Not clamped, as compilers make branches of
+    /// that for floats, which are guessed wrong; below the first bin is no centre, as half a bin less is rounded to even.
     #[inline(always)]
     fn place(&self, centre: f32, k: usize) -> f32 {
-        let at = (centre - self.lower[k]) * self.scale[k] - 0.5;
-        lesser(greater(at, 0.0), self.last) + INTEGER
+        (centre - self.lower[k]) * self.scale[k] - 0.5 + INTEGER
     }
 }
 
@@ -143,6 +150,7 @@ impl Plane {
             let (before, from) = refs.split_at_mut(i);
             let Some(r) = from.first_mut() else { break };
             let Box4 { lower, upper } = &r.bounds;
+            // NaN is right, as it is in the last bin.
             let left = self.binning.place(middle(lower[k], upper[k]), k) < right;
             // None when all so far are left.
             if let Some(place) = before.get_mut(count) {
@@ -170,25 +178,28 @@ impl Bins {
         Bins([const { Axis { bounds: [Box4::ZERO; BINS], counts: [0; BINS] } }; AXES]);
 }
 
-/// The best split by bins of the box around the centres, or `None` when all fall into one.
+/// The best split by bins of the box around the centres, or `None` when all fall into one. With `one_axis`, only the axis
+/// along which these are furthest apart is looked at.
 ///
 /// Source: \[Wald07\].
 pub(crate) fn best_plane(
     refs: &[PrimRef],
     centres: &Box4,
     areas: Areas,
-    effort: Effort,
+    (effort, one_axis): (Effort, bool),
     Bins(axes): &mut Bins,
 ) -> Option<Plane> {
     let binning = Binning::new(centres, refs.len(), effort.bins);
     let sample = refs.iter().step_by(effort.step(refs.len()).max(1));
-    if !SMALL {
+    let one_by_one = SMALL || one_axis;
+    if !one_by_one {
         fill(axes, &binning, sample.clone());
     }
     let mut best = (f32::INFINITY, 0, 0);
-    for k in 0..3 {
+    let widest = centres.widest();
+    for k in if one_axis { widest..widest + 1 } else { 0..3 } {
         let Some(axis) = axes.get_mut(k % AXES) else { break };
-        if SMALL {
+        if one_by_one {
             axis.fill(&binning, k, sample.clone());
         }
         let (work, bin) = axis.best(binning.bins, areas);
@@ -263,5 +274,69 @@ impl Axis {
             }
         }
         best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bvh::split::Extent;
+    use crate::math::Aabb;
+    use std::vec::Vec;
+
+    /// Refs in a part of space of this size, at this distance.
+    fn refs_of(count: u32, size: f32, distance: f32) -> Vec<PrimRef> {
+        let mut state = 7u32;
+        let mut next = || {
+            state = state.wrapping_mul(0x19660d).wrapping_add(0x3c6ef35f);
+            distance + size * (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let mut at = |id| {
+            let lower = [next(), next(), next()];
+            PrimRef::new(id, &Aabb { lower, upper: lower.map(|x| x + size / 64.0) }, false)
+        };
+        (0..count).map(&mut at).collect()
+    }
+
+    #[test]
+    fn what_is_in_the_box_is_in_a_bin() {
+        let sizes = [1e-30, 1e-3, 1.0, 77.7, 1e30];
+        let places = sizes.map(|size| [(size, 0.0), (size, size), (size, -1e4 * size)]);
+        for (size, distance) in places.into_iter().flatten() {
+            for (count, most) in [(2, 16), (9, 16), (37, 16), (100, 32), (3000, 16), (3000, 32)] {
+                let mut refs = refs_of(count, size, distance);
+                let centres = Extent::around(&refs).centres;
+                let binning = Binning::new(&centres, refs.len(), most);
+                let mut counts = [[0; BINS]; 3];
+                for r in &refs {
+                    let bins = binning.bins_of(r);
+                    assert_eq!(bins, [0, 1, 2].map(|k| binning.bin_of(r, k)));
+                    (0..3).for_each(|k| counts[k][bins[k]] += 1);
+                }
+                for (axis, counts) in counts.iter().enumerate() {
+                    let used = &counts[..binning.bins];
+                    assert_eq!(used.iter().sum::<usize>(), refs.len(), "{size} {distance}");
+                    assert!(used[0] > 0 && used[binning.bins - 1] > 0, "{size} {distance}");
+                    for bin in 1..binning.bins {
+                        let left = Plane { binning, axis, bin }.part(&mut refs);
+                        assert_eq!(left, used[..bin].iter().sum::<usize>());
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_place_is_in_the_last_bin() {
+        let lower = [f32::NEG_INFINITY, 1.0, 2.0];
+        let everywhere = Aabb { lower, upper: [f32::INFINITY, 1.0, 5.0] };
+        let mut refs = [PrimRef::new(0, &everywhere, true); 12];
+        refs[3] = PrimRef::new(1, &Aabb { lower: [4.0, 1.0, 3.0], upper: [4.0, 1.0, 3.0] }, true);
+        let binning = Binning::new(&Extent::around(&refs).centres, refs.len(), 16);
+        let last = binning.bins - 1;
+        assert!(refs.iter().all(|r| binning.bins_of(r)[..2] == [last; 2]));
+        for axis in 0..2 {
+            assert_eq!(Plane { binning, axis, bin: last }.part(&mut refs), 0);
+        }
     }
 }

@@ -287,6 +287,7 @@ mod tests {
         let limits = Limits {
             leaves,
             source: None,
+            blocks: None,
             leaf_max: 6,
             mixed: false,
             depth: Depth::Paying,
@@ -333,8 +334,16 @@ mod tests {
         // All choose planes of large nodes by samples, the last one of those that turn out to be even.
         for (effort, even) in [(fast, None), (balanced, None), (careful, Some(balanced))] {
             let (leaves, leaf_max, depth) = (count / 2, 4, Depth::Whole);
-            let limits =
-                Limits { leaves, source: None, leaf_max, mixed: false, depth, effort, even };
+            let limits = Limits {
+                leaves,
+                source: None,
+                blocks: None,
+                leaf_max,
+                mixed: false,
+                depth,
+                effort,
+                even,
+            };
             let size = grow(&mut nodes, &mut refs, count, &limits, &Caller::new(None, None));
             assert_eq!(size.map(|size| size.refs), Some(count));
             let (mut pending, mut first) = (std::vec![0], 0);

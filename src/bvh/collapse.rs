@@ -93,9 +93,9 @@ pub(super) struct Grounds<'t> {
     pub ids: &'t [u32],
     pub areas: Areas,
     pub price: f32,
-    /// Whether leaves are not to be put together: visiting an instance costs more than telling it from others, and
-    /// [runs](super::runs) are whole leaf blocks.
-    pub alone: bool,
+    /// Leaves of more primitives are not put together. That is none where visiting an instance costs more than telling it from
+    /// others, and where leaves are [runs](super::runs), which are whole leaf blocks.
+    pub together: usize,
 }
 
 /// What a leaf block costs, in bundles. Where it may as well be a bundle over blocks of its own, with boxes that are little
@@ -174,8 +174,9 @@ impl<const W: usize> Decided<W> {
         self.cost = [LEAF * areas.of(&self.aabb) + price; W];
         self.lanes = 1;
         self.content.count = count;
-        if grounds.alone || is_sphere {
-            self.content.kind = if grounds.alone { Kind::Much } else { Kind::Spheres };
+        let alone = count > grounds.together;
+        if alone || is_sphere {
+            self.content.kind = if alone { Kind::Much } else { Kind::Spheres };
             return Some(());
         }
         self.content.kind = Kind::Triangles;

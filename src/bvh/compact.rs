@@ -107,6 +107,7 @@ fn grow_tree(
     let limits = Limits {
         leaves,
         source: None,
+        blocks: None,
         leaf_max: LEAF_MAX,
         mixed,
         depth: Depth::Paying,

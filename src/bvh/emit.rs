@@ -222,6 +222,7 @@ mod tests {
             leaves: LEAVES,
             source: None,
             leaf_max: 1,
+            blocks: None,
             mixed: false,
             depth: Depth::Deep,
             effort: Effort::BALANCED,
@@ -297,7 +298,8 @@ mod tests {
     fn chosen<const W: usize>(nodes: &[BvhNode]) -> f32 {
         let mut choices = [0; LEAVES - 1];
         let scene = Scene::new(&[], &[]);
-        let grounds = Grounds { nodes, ids: &[], areas: areas(), price: PRICE, alone: false };
+        let grounds =
+            Grounds { nodes, ids: &[], areas: areas(), price: PRICE, together: usize::MAX };
         let source = Source { scene: &scene, geometries: &[], named: false };
         choose::<W>(&grounds, source, &Caller::new(None, None), &mut choices).expect("a tree");
         let area = |node: u32| areas().of(&nodes[node as usize].aabb());

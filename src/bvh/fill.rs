@@ -4,7 +4,7 @@ use super::emit::BEGINS;
 use crate::block::PartsMut;
 use crate::block::leaf::{SphereBlock, TriangleBlock};
 use crate::caller::{Caller, PARTS};
-use crate::prim::{GRAIN, Packer, Source};
+use crate::prim::{BlockWriter, GRAIN, Packer, Source};
 use crate::scene::Scene;
 
 /// The ids of some leaf blocks, and those blocks.
@@ -58,23 +58,48 @@ pub(super) fn take_marks_off(ids: &mut [u32]) {
 
 impl Run<'_> {
     fn pack(&mut self, source: Source, first_sphere: usize) -> Option<()> {
-        let (first, first_sphere) = (self.first as u32, self.first.max(first_sphere) as u32);
-        let (triangles, spheres) = (&mut *self.triangle_blocks, &mut *self.sphere_blocks);
-        let block_count = triangles.len();
-        let mut packer = Packer::new(triangles, spheres, first, first_sphere);
-        let mut shapes = source.shapes();
-        for i in 0..self.ids.len() {
-            shapes.look_ahead(|n| self.ids.get(i + n).map(|id| id & !BEGINS));
-            let id = self.ids.get_mut(i)?;
-            if *id & BEGINS != 0 {
-                packer.close();
-            }
-            *id &= !BEGINS;
-            match shapes.corners(*id) {
-                Some(corners) => packer.push_triangle(corners)?,
-                None => packer.push(&shapes.get(*id)?)?,
-            };
-        }
-        (packer.triangle_block_count() == block_count).then_some(())
+        let (triangles, spheres) =
+            self.ids.split_at_mut(first_sphere.saturating_sub(self.first).min(self.ids.len()));
+        let first = self.first as u32;
+        pack_triangles(source, first, triangles, self.triangle_blocks)?;
+        pack_spheres(source, first + triangles.len() as u32, spheres, self.sphere_blocks)
     }
+}
+
+/// Packs triangles, whose first id is entry `first`: each block has those from one mark to the next.
+fn pack_triangles(
+    source: Source,
+    mut first: u32,
+    mut ids: &mut [u32],
+    blocks: &mut [TriangleBlock],
+) -> Option<()> {
+    let mut writer = BlockWriter::new(source.shapes());
+    for block in blocks {
+        *ids.first_mut()? &= !BEGINS;
+        let count = 1 + ids.iter().skip(1).take_while(|id| **id & BEGINS == 0).count();
+        let next = |n: usize| ids.get(n).map(|id| id & !BEGINS);
+        writer.write(block, first, ids.get(..count)?, next)?;
+        first += count as u32;
+        ids = ids.split_at_mut_checked(count)?.1;
+    }
+    ids.is_empty().then_some(())
+}
+
+/// The same of spheres.
+fn pack_spheres(
+    source: Source,
+    first: u32,
+    ids: &mut [u32],
+    blocks: &mut [SphereBlock],
+) -> Option<()> {
+    let mut packer = Packer::new(&mut [], blocks, 0, first);
+    let mut shapes = source.shapes();
+    for id in ids {
+        if *id & BEGINS != 0 {
+            packer.close();
+        }
+        *id &= !BEGINS;
+        packer.push(&shapes.get(*id)?)?;
+    }
+    Some(())
 }

@@ -1,7 +1,48 @@
 //! Whether triangles fit into one leaf block: at most 16, over at most 16 vertices of distinct bits.
 
+use super::refs::PrimRef;
 use crate::block::leaf::{TRIANGLES, low_bits};
-use crate::prim::{Numbers, Vertices};
+use crate::prim::{Known, Numbers, Shapes, Vertices};
+
+/// Tells by the numbers of vertices what surely fits.
+pub(super) struct Fits<'s, 'a> {
+    shapes: Shapes<'s, 'a>,
+    known: Known,
+}
+
+impl<'s, 'a> Fits<'s, 'a> {
+    pub fn new(shapes: Shapes<'s, 'a>) -> Self {
+        Fits { shapes, known: Known::NOTHING }
+    }
+
+    /// Whether the triangles of these refs fit into one block. What has other numbers counts as another vertex.
+    pub fn are_a_block(&mut self, refs: &[PrimRef]) -> bool {
+        let triangles = refs.iter().map(PrimRef::count).sum::<usize>();
+        if triangles > TRIANGLES || refs.iter().any(PrimRef::is_sphere) {
+            return false;
+        }
+        self.known.forget();
+        let mut vertices = 0;
+        refs.iter().all(|r| {
+            vertices += self.new_vertices(r);
+            vertices <= TRIANGLES
+        })
+    }
+
+    /// How many vertices of a ref the ones before do not have.
+    fn new_vertices(&mut self, r: &PrimRef) -> usize {
+        let mut count = 0;
+        for id in (r.id()..).take(r.count()) {
+            // A strip has two vertices more than triangles.
+            let Some((mesh, numbers)) = self.shapes.numbers(id) else { return r.count() + 2 };
+            for number in numbers {
+                count += usize::from(self.known.find(mesh, number).is_none());
+                self.known.learn(mesh, number, 0);
+            }
+        }
+        count
+    }
+}
 
 /// The distinct vertices of a few triangles.
 #[derive(Clone, Copy)]
@@ -73,6 +114,42 @@ impl Corners {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::Aabb;
+    use crate::prim::{Source, geometry_table};
+    use crate::scene::{Mesh, Scene};
+    use std::vec::Vec;
+
+    #[test]
+    fn what_fits_is_told_by_numbers() {
+        let vertices = [[0.0; 3]; 40];
+        let strip: Vec<_> = (0..17).map(|i| [i, i + 1, i + 2]).collect();
+        let fan: Vec<_> = (0..17).map(|i| [30, 30 + i % 5, 31 + i % 5]).collect();
+        let soup: Vec<_> = (0..17).map(|_| [[0.0; 3]; 3]).collect();
+        let meshes =
+            [Mesh::indexed(&vertices, &strip), Mesh::indexed(&vertices, &fan), Mesh::soup(&soup)];
+        let scene = Scene::new(&meshes, &[]);
+        let geometries: Vec<_> = geometry_table(&scene).collect();
+        let source = Source { scene: &scene, geometries: &geometries, named: false };
+        let mut fits = Fits::new(source.shapes());
+        let mut fit = |firsts: core::ops::Range<u32>, strip: u32, sphere: bool| {
+            let refs: Vec<_> = (firsts.step_by(strip as usize))
+                .map(|id| {
+                    let mut r = PrimRef::new(id, &Aabb::EMPTY, sphere);
+                    r.bounds.upper[3] *= strip as f32;
+                    r
+                })
+                .collect();
+            fits.are_a_block(&refs)
+        };
+        for _ in 0..2 {
+            assert!(fit(0..14, 1, false) && !fit(0..15, 1, false), "16 and 17 vertices");
+            assert!(fit(0..14, 2, false), "in pairs");
+            assert!(fit(17..33, 1, false) && !fit(17..34, 1, false), "16 and 17 triangles");
+            assert!(fit(34..39, 1, false) && !fit(34..40, 1, false), "three vertices each");
+            assert!(fit(34..42, 2, false) && !fit(34..44, 2, false), "four vertices a pair");
+            assert!(!fit(0..2, 1, true), "spheres");
+        }
+    }
 
     fn triangles(vertices: &[[f32; 3]]) -> impl Iterator<Item = [[f32; 3]; 3]> {
         vertices.chunks_exact(3).map(|v| [v[0], v[1], v[2]])

@@ -58,7 +58,7 @@ impl Plan {
         let uneven = how.effort.for_uneven(unevenness);
         let (prims, still) = (census.hittable(), census.sphere_count == 0 && !census.refit);
         let cut = uneven.is_some_and(|effort| effort.cuts) && still;
-        if uneven.is_none() && how.effort.runs && census.triangle_count == prims {
+        if uneven.is_none() && how.effort.blocks && census.triangle_count == prims {
             let count = (count, prims as usize);
             if let Some(places) = put_into_runs(count, &places, source, areas, bytes) {
                 let count = places.room;

@@ -262,6 +262,7 @@ mod tests {
         let limits = Limits {
             leaves: count,
             source: None,
+            blocks: None,
             leaf_max: 5,
             mixed: false,
             depth: Depth::Deep,

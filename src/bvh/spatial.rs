@@ -264,6 +264,7 @@ mod tests {
         let limits = Limits {
             leaves: count,
             source: Some(Source { scene: &scene, geometries: &geometries, named: false }),
+            blocks: None,
             leaf_max: 5,
             mixed: false,
             depth: Depth::Deep,

@@ -4,6 +4,7 @@ use super::MAX_DEPTH;
 use super::bins::{Bins, Effort, best_plane};
 use super::branch::Branch;
 use super::budget::{fewest_leaves, levels_to_halve};
+use super::fits::Fits;
 use super::refs::PrimRef;
 use super::spatial::{best_cut, overlap};
 use super::split::{Areas, Extent, greater};
@@ -11,6 +12,7 @@ use super::spread::unevenness;
 use super::sweep::{FEW, sort_few, sweep};
 use super::task::{Known, Split, Task, Tasks};
 use crate::block::BvhNode;
+use crate::block::leaf::TRIANGLES;
 use crate::kinds::{BALLS, SPHERES, WIDE};
 use crate::math::Aabb;
 use crate::prim::{Shapes, Source};
@@ -49,6 +51,9 @@ pub(crate) struct Limits<'s, 'a> {
     pub leaves: usize,
     /// Where shapes are looked up to cut them in two, if they may be.
     pub source: Option<Source<'s, 'a>>,
+    /// Where vertices are looked up, if a tree is wanted soon: then what fits into a leaf block is a leaf, unless two boxes are
+    /// smaller than one, and few refs are parted along one axis only.
+    pub blocks: Option<Source<'s, 'a>>,
     /// Refs of a leaf at most; 2 to 6.
     pub leaf_max: usize,
     /// Whether there are triangles and spheres: a leaf is of one kind.
@@ -100,6 +105,9 @@ const OVERLAP: f32 = 5e-3;
 const OVERLAP_OF_NODE: f32 = 0.1;
 /// Cutting must save this part of the work.
 const SAVED: f32 = 0.02;
+/// Fewer refs are parted along one axis, where that may be.
+const ONE_AXIS: usize = 1024;
+
 /// Of fewer refs none are cut.
 const CUT_FROM: usize = 32;
 
@@ -116,12 +124,14 @@ pub(super) struct Splitter<'l, 's, 'a> {
 pub(super) struct Scratch<'s, 'a> {
     bins: Bins,
     shapes: Option<Shapes<'s, 'a>>,
+    fits: Option<Fits<'s, 'a>>,
 }
 
 impl<'s, 'a> Splitter<'_, 's, 'a> {
     pub fn scratch(self) -> Scratch<'s, 'a> {
         let shapes = self.limits.source.map(Source::shapes);
-        Scratch { bins: Bins::UNUSED, shapes }
+        let fits = self.limits.blocks.map(|source| Fits::new(source.shapes()));
+        Scratch { bins: Bins::UNUSED, shapes, fits }
     }
 
     /// Grows a branch; returns its root.
@@ -169,12 +179,27 @@ impl Splitter<'_, '_, '_> {
     ) -> Option<Split> {
         let refs = slots.get_mut(..task.count)?;
         let split = self.part_refs(refs, task, extent, &mut scratch.bins)?;
+        if WIDE && scratch.fits.as_mut().is_some_and(|f| self.is_block(refs, extent, &split, f)) {
+            return None;
+        }
         if task.count < CUT_FROM || task.room == task.count {
             return Some(split);
         }
         // Compact trees are not cut.
         let Some(shapes) = scratch.shapes.as_mut().filter(|_| WIDE) else { return Some(split) };
         Some(self.cut(slots, (task, extent), &split, shapes).unwrap_or(split))
+    }
+
+    /// Whether refs had better not be parted, but be one leaf block.
+    fn is_block(self, refs: &[PrimRef], extent: &Extent, split: &Split, fits: &mut Fits) -> bool {
+        if refs.len() > TRIANGLES {
+            return false;
+        }
+        let area = |extent: &Extent| self.areas.of_finite(&extent.bounds);
+        let (left, right) = refs.split_at_checked(split.counts[0]).unwrap_or((refs, &[]));
+        let [left, right] =
+            [split.sides[0].extent(left, 1), split.sides[1].extent(right, 1)].map(|e| area(&e));
+        area(extent) <= left + right && fits.are_a_block(refs)
     }
 
     /// Parts the refs of a node in two, or decides for a leaf.
@@ -213,7 +238,8 @@ impl Splitter<'_, '_, '_> {
             sweep.map(|s| self.split_at(refs, s.left_count, task.even))
         } else {
             // None when all centres are in one point.
-            best_plane(refs, &extent.centres, areas, effort, bins).and_then(|plane| {
+            let one_axis = self.limits.blocks.is_some() && count < ONE_AXIS;
+            best_plane(refs, &extent.centres, areas, (effort, one_axis), bins).and_then(|plane| {
                 let left_count = plane.part(refs);
                 lasts(left_count).then(|| self.split_at(refs, left_count, task.even))
             })
@@ -350,8 +376,9 @@ pub(super) mod tests {
                 let mut refs = series(count, ratio);
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
                 let effort = Effort::BALANCED;
-                let (source, even) = (None, None);
-                let limits = Limits { leaves, source, leaf_max, mixed: false, depth, effort, even };
+                let (source, blocks, even) = (None, None, None);
+                let limits =
+                    Limits { leaves, source, blocks, leaf_max, mixed: false, depth, effort, even };
                 let caller = &Caller::new(None, None);
                 let used = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");
                 let levels = levels(&nodes[..used.nodes]);

@@ -15,6 +15,7 @@ use super::runs::name_ids;
 use super::split::Areas;
 use super::tree::{Depth, Limits};
 use crate::block::bundle::{Bundle, LANE};
+use crate::block::leaf::TRIANGLES_AT_LEAST;
 use crate::block::{BvhNode, Census, Counts, Geometry, KIND_BVH, PartsMut};
 use crate::caller::Caller;
 use crate::error::BuildError;
@@ -154,9 +155,11 @@ fn grow_tree(
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
     let slots = storage::view_mut::<PrimRef>(refs, 0, places.room)?;
     let effort = uneven.unwrap_or(how.effort);
+    let in_blocks = effort.blocks && !in_runs;
     let limits = Limits {
         leaves: places.leaves,
         source: cut.then_some(source),
+        blocks: in_blocks.then_some(source),
         leaf_max,
         mixed: census.is_mixed(),
         depth: match uneven {
@@ -175,7 +178,12 @@ fn grow_tree(
     if uneven.is_some() {
         mend(nodes.get_mut(..size.nodes)?, ids, areas, free)?;
     }
-    Scratch::new(&places, &size, in_runs)
+    let together = match in_blocks {
+        _ if census.is_index || in_runs => 0,
+        true => TRIANGLES_AT_LEAST,
+        false => usize::MAX,
+    };
+    Scratch::new(&places, &size, together)
 }
 
 /// Moves the ids of all refs to the end of their place; returns what is free before them, and them.
@@ -211,17 +219,17 @@ struct Scratch {
     prims: usize,
     nodes: usize,
     node_count: usize,
-    /// Whether leaves are [runs](super::runs).
-    in_runs: bool,
+    /// As in [`Grounds`].
+    together: usize,
 }
 
 impl Scratch {
-    fn new(places: &Places, size: &Size, in_runs: bool) -> Option<Scratch> {
+    fn new(places: &Places, size: &Size, together: usize) -> Option<Scratch> {
         let pairs = size.nodes / 2 - 1;
         let ids = places.nodes - 4 * size.prims;
         let choices = (ids / 8 * 8).checked_sub(8 * pairs)?;
         let (prims, nodes, node_count) = (size.prims, places.nodes, size.nodes);
-        Some(Scratch { choices, pairs, ids, prims, nodes, node_count, in_runs })
+        Some(Scratch { choices, pairs, ids, prims, nodes, node_count, together })
     }
 
     fn choose<const W: usize>(
@@ -239,8 +247,8 @@ impl Scratch {
         let choices = storage::view_mut::<u64>(middle, 0, self.pairs)?;
         let table = Counts { geometries: survey.geometry_count, ..Counts::default() };
         let geometries = table.parts_mut(front)?.geometries;
-        let alone = census.is_index || self.in_runs;
-        let grounds = Grounds { nodes, ids, areas, price, alone };
+        let together = self.together;
+        let grounds = Grounds { nodes, ids, areas, price, together };
         let source = Source { scene, geometries, named: census.refit };
         choose::<W>(&grounds, source, caller, choices)?;
         Chosen { nodes, choices, ids }.sizes::<W>()

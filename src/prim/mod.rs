@@ -2,6 +2,7 @@
 
 mod census;
 mod gather;
+mod known;
 mod names;
 mod numbers;
 mod pack;
@@ -9,8 +10,10 @@ mod refit;
 mod shapes;
 mod validate;
 mod visit;
+mod whole;
 
 pub(crate) use gather::{GRAIN, Shape, Survey, box_around, geometries, geometry_table, survey};
+pub(crate) use known::Known;
 pub(crate) use names::Names;
 pub(crate) use names::digest;
 pub(crate) use numbers::{Numbers, Vertices};
@@ -19,6 +22,7 @@ pub(crate) use refit::refit_leaves;
 pub(crate) use shapes::{Shapes, Source};
 pub(crate) use validate::leaves_are_sound;
 pub(crate) use visit::{Visitor, for_each_counted, for_each_named_in, for_each_prim_in, visit};
+pub(crate) use whole::BlockWriter;
 
 use crate::block::Block;
 use crate::block::leaf::{

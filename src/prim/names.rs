@@ -7,12 +7,17 @@ use crate::caller::Caller;
 use crate::scene::{Mesh, Scene};
 
 impl Mesh<'_> {
-    /// What stands for the vertices of triangle `i` where they are compared by their bits: two are the same if they are
-    /// the same vertex. `first` is the flat number of the mesh's first triangle.
+    /// What stands for a vertex where vertices are compared by their bits: two are the same if they are the same vertex.
+    /// `first` is the flat number of the mesh's first triangle.
+    #[inline]
+    pub(crate) fn name(first: u32, vertex: usize) -> [f32; 3] {
+        [f32::from_bits(vertex as u32), f32::from_bits(first), 0.0]
+    }
+
+    /// The same for those of triangle `i`.
     #[inline]
     pub(crate) fn names(&self, first: u32, i: usize) -> Option<[[f32; 3]; 3]> {
-        let [mesh, zero] = [f32::from_bits(first), 0.0];
-        Some(self.numbers(i)?.map(|v| [f32::from_bits(v as u32), mesh, zero]))
+        Some(self.numbers(i)?.map(|v| Mesh::name(first, v)))
     }
 }
 

@@ -65,15 +65,32 @@ impl<'s, 'a> Shapes<'s, 'a> {
     /// The numbers of a triangle's vertices, if they have any, and the first triangle of its mesh.
     #[inline]
     pub fn numbers(&mut self, id: u32) -> Option<(u32, [usize; 3])> {
+        let found = self.numbered(id)?;
+        let indexed = self.mesh.as_ref().is_some_and(|(_, mesh)| mesh.is_indexed());
+        indexed.then_some(found)
+    }
+
+    /// The places of a triangle's vertices in its mesh, which becomes the last one, and the first triangle of that.
+    #[inline(always)]
+    pub fn numbered(&mut self, id: u32) -> Option<(u32, [usize; 3])> {
         let of_last = |(first, mesh): &(u32, Mesh)| {
-            let numbers = mesh.numbers(id.checked_sub(*first)? as usize)?;
-            mesh.is_indexed().then_some((*first, numbers))
+            Some((*first, mesh.numbers(id.checked_sub(*first)? as usize)?))
         };
         if let Some(found) = self.mesh.as_ref().and_then(of_last) {
             return Some(found);
         }
         self.find(id)?;
         self.mesh.as_ref().and_then(of_last)
+    }
+
+    /// A vertex of the last one's mesh.
+    #[inline(always)]
+    pub fn vertex(&self, number: usize) -> Option<[f32; 3]> {
+        let (first, mesh) = self.mesh.as_ref()?;
+        if REFIT && self.source.named {
+            return Some(Mesh::name(*first, number));
+        }
+        mesh.vertex(number)
     }
 
     /// The shape with flat number `id`, whether it can be hit or not.
