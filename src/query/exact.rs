@@ -231,7 +231,7 @@ impl Decide for Exact {
     #[inline(always)]
     fn sure<S: Simd>(s: S, ray: &PreparedRay, lane: &TriangleLane) -> Option<(f32, [f32; 2])> {
         let PlaneMeeting { t, t_error, weights: [u, v], clear, .. } =
-            PlaneMeeting::by(s, &ray.given.0, &lane.corners().map(|[x, y, z]| [x, y, z, 0.0]));
+            PlaneMeeting::by(s, &ray.given.rows(), &lane.corners().map(|[x, y, z]| [x, y, z, 0.0]));
         let t = surely_rounded(interval(t, t_error), t).filter(|_| clear != 0)?;
         Some((t, clamped_weights([u as f32, v as f32])))
     }

@@ -106,7 +106,10 @@ impl Choice {
 }
 
 /// A choice among the primitives of a block.
+///
+/// In C's order: in another one a compiler made room for queries twice, and copied all of it.
 #[derive(Clone, Copy)]
+#[repr(C)]
 pub(crate) struct Filter<'m> {
     /// Its parts are found when they are asked for, which is rare.
     pub block: Finished<'m>,

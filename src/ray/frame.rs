@@ -1,7 +1,7 @@
 //! A ray in a frame of its own, in which `f32` neither over- nor underflows.
 
 use super::exponents::rounded;
-use super::{Axis, Rows};
+use super::{Axis, Ray};
 use crate::exact::Line;
 use crate::math::rounding::{Round, UNIT32, f32_above};
 
@@ -15,7 +15,7 @@ use crate::math::rounding::{Round, UNIT32, f32_above};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PreparedRay {
     /// The ray as it was given.
-    pub given: Rows,
+    pub given: Ray,
     /// From given coordinates to the frame's: a power of two between 2^-126 and 2^126.
     pub scale: f32,
     /// The fourth lane of these two means nothing: four are one vector on most machines.
@@ -118,7 +118,7 @@ impl Shear {
 impl PreparedRay {
     /// Nothing in particular.
     pub const BLANK: Self = PreparedRay {
-        given: Rows([[0.0; 4]; 2]),
+        given: Ray::new([0.0; 3], [0.0; 3]),
         scale: 0.0,
         origin: [0.0; 4],
         direction: [0.0; 4],

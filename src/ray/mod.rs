@@ -1,7 +1,5 @@
 //! Rays, hits, and what a traversal knows about a ray before it starts.
 
-use core::ops::Deref;
-
 use crate::simd::{Lanes, Simd, Width};
 
 mod abreast;
@@ -79,25 +77,17 @@ impl Ray {
         [[x, y, z, t_min], [dx, dy, dz, t_max]]
     }
 
+    /// The ray with these halves, which is written by these: what is written by parts is slow to read as a whole.
+    #[allow(unsafe_code, reason = "a promise about the layout drawn here")]
+    #[inline(always)]
+    pub(crate) fn of_rows(rows: [[f32; 4]; 2]) -> Self {
+        // SAFETY: eight floats, as for `row`.
+        unsafe { core::mem::transmute(rows) }
+    }
+
     /// The same ray, limited to `t_min <= t <= t_max`.
     pub const fn with_limits(self, t_min: f32, t_max: f32) -> Self {
         Ray { t_min, t_max, ..self }
-    }
-}
-
-/// A ray that is kept as its halves: what is written by parts is slow to read as a whole.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct Rows(pub [[f32; 4]; 2]);
-
-impl Deref for Rows {
-    type Target = Ray;
-
-    #[allow(unsafe_code, reason = "a promise about the layout drawn above")]
-    #[inline(always)]
-    fn deref(&self) -> &Ray {
-        // SAFETY: eight floats, as for `row`.
-        unsafe { &*core::ptr::from_ref(self).cast() }
     }
 }
 

@@ -5,7 +5,7 @@ use super::exponents::{
 };
 use super::frame::{PreparedRay, SLOWEST, Shear, TINY};
 use super::slab::{NarrowSlab, Scales};
-use super::{Axis, Ray, Rows};
+use super::{Axis, Ray};
 use crate::exact::Line;
 use crate::math::float::{narrow_power_of_two, power_of_two};
 use crate::math::rounding::Round;
@@ -103,7 +103,6 @@ impl Ray {
     #[inline(never)]
     pub(crate) fn prepare_any(&self, reach: f32) -> Option<PreparedRay> {
         let (farthest, longest) = (largest_bits(&self.origin), largest_bits(&self.direction));
-        let Ray { origin: [x, y, z], direction: [dx, dy, dz], .. } = *self;
         let (t_min, t_max) = (self.least(), self.most());
         let finite = farthest < EXPONENT && longest < EXPONENT;
         if !(finite && longest > 0 && t_min <= t_max) {
@@ -129,7 +128,7 @@ impl Ray {
         let above = rounded(t_max, t_exponent, Round::Above);
         let [below, above] = framed([below, above]);
         Some(PreparedRay {
-            given: Rows([[x, y, z, t_min], [dx, dy, dz, t_max]]),
+            given: Ray { t_min, t_max, ..*self },
             scale,
             origin,
             direction,
@@ -200,7 +199,7 @@ impl<S: Simd> Late for LateRay<S> {
         let (depth, [scale, ..]) = (self.depth(), array::<S>(space));
         let pace = array::<S>(inverse.mul(length))[depth as usize];
         PreparedRay {
-            given: Rows([array::<S>(o), array::<S>(d)]),
+            given: Ray::of_rows([array::<S>(o), array::<S>(d)]),
             scale,
             origin,
             direction,

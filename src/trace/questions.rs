@@ -119,7 +119,7 @@ impl<'m, D: Decide, W: Watch> Question<'m> for EitherHit<D, W> {
 
     fn query(self, block: Finished<'m>, t_max: f32) -> Self::Query {
         let EitherHit { choice, watch, any, .. } = self;
-        Either { closest: ClosestHit::new(choice, watch).query(block, t_max), any }
+        Either { closest: Closest::new(Filter::new(choice, block), t_max, watch), any }
     }
 
     fn answer<S: Simd>(
