@@ -132,6 +132,28 @@ mod tests {
         }
     }
 
+    /// Queries of bundles look for no nodes and no grid between the parts they use.
+    #[test]
+    fn a_block_has_one_structure() {
+        const SIZE: usize = 16;
+        const COUNTS: [usize; 3] = [96, 100, 104];
+        let triangles = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]];
+        let meshes = [Mesh::soup(&triangles)];
+        let options = BuildOptions { plain_list: PlainList::Never, ..Default::default() };
+        let built = OwnedAccel::bvh(&Scene::new(&meshes, &[]), &options).expect("a structure");
+        assert!(matches!(built.accel().info().layout, Layout::Wide(_)));
+        let block = built.accel().block();
+        let size = block.len() + 64;
+        for count in COUNTS {
+            let mut copy = AlignedMemory::new(size).expect("memory");
+            let bytes = copy.bytes_mut();
+            bytes[..block.len()].copy_from_slice(block);
+            bytes[SIZE..SIZE + 8].copy_from_slice(&(size as u64).to_ne_bytes());
+            bytes[count..count + 4].copy_from_slice(&1u32.to_ne_bytes());
+            assert_eq!(Accel::recognise(bytes).err(), Some(OpenError::Corrupt));
+        }
+    }
+
     /// Whatever the bytes hold, even if they were never opened, no panic and no endless loop.
     #[test]
     fn any_bytes_may_be_refitted() {

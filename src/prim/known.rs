@@ -3,7 +3,7 @@
 use crate::block::leaf::TRIANGLES;
 use crate::kinds::WIDE;
 
-/// Places of the table. Only builds of wide layouts ask it; what they make depends on it.
+/// Places of the table, a power of two. Only builds of wide layouts ask it; what they make depends on it.
 const PLACES: usize = if WIDE { 64 } else { 1 };
 
 /// The vertices of a few triangles: a table that forgets one where another wants its place.
@@ -24,7 +24,7 @@ impl Known {
     /// The place, below 16, of vertex `number` of the mesh whose first triangle is `mesh`.
     #[inline(always)]
     pub fn find(&self, mesh: u32, number: usize) -> Option<usize> {
-        let (vertex, place) = self.entries[number % PLACES];
+        let (vertex, place) = self.entries[number & (PLACES - 1)];
         let known = (vertex == name(mesh, number)) & (place / TRIANGLES as u64 == self.times);
         known.then_some(place as usize % TRIANGLES)
     }
@@ -32,7 +32,7 @@ impl Known {
     #[inline(always)]
     pub fn learn(&mut self, mesh: u32, number: usize, place: usize) {
         let place = self.times * TRIANGLES as u64 + (place % TRIANGLES) as u64;
-        self.entries[number % PLACES] = (name(mesh, number), place);
+        self.entries[number & (PLACES - 1)] = (name(mesh, number), place);
     }
 }
 

@@ -152,7 +152,7 @@ impl Slab for NarrowSlab {
             first: [0, 1, 2].map(|k| {
                 // All ones if the ray runs back: a mask, and numbers of floats, are the least that each bundle can do with.
                 let back = (self.reciprocal[k].to_bits() as i32 >> 31) as usize;
-                k * N + (3 * N & back)
+                k * N + ((3 * N) & back)
             }),
             s,
         }
