@@ -137,7 +137,8 @@ mod tests {
     fn a_block_has_one_structure() {
         const SIZE: usize = 16;
         const COUNTS: [usize; 3] = [96, 100, 104];
-        let triangles = [[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]];
+        let row = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let triangles: Vec<_> = (0..100).map(|i| row.map(|[x, y, _]| [x, y, i as f32])).collect();
         let meshes = [Mesh::soup(&triangles)];
         let options = BuildOptions { plain_list: PlainList::Never, ..Default::default() };
         let built = OwnedAccel::bvh(&Scene::new(&meshes, &[]), &options).expect("a structure");
