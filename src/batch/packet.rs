@@ -76,7 +76,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
                 };
                 let (entered, near) = hull.entered::<true>(&bundle.walls, bound);
                 self.fetch(s, bundle, entered);
-                if !walk.go_on::<S, Q::Query, 16>(s, bundle, entered, near) {
+                if !walk.go_on(s, bundle, (entered, near), Q::Query::ORDERED) {
                     return;
                 }
             }
@@ -88,7 +88,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
             if bound == f32::NEG_INFINITY {
                 return;
             }
-            walk.leave::<S, Q::Query>(s, bound);
+            walk.leave(s, bound, Q::Query::ORDERED);
         }
     }
 

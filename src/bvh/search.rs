@@ -1,8 +1,8 @@
 //! From near boxes to far ones around a point.
 
 use super::MAX_DEPTH;
-use super::stack::{Columns, Stack};
-use super::wide::ENOUGH_ROOM;
+use super::stack::Columns;
+use super::wide::{ENOUGH_ROOM, Walk};
 use crate::block::BvhNode;
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::point::Seek;
@@ -46,8 +46,7 @@ pub(crate) fn search(nodes: &[BvhNode], nearest: &mut impl Seek) {
     }
 }
 
-/// Offers `nearest` the leaves of a tree of bundles, near ones first: as a [walk](super::Walk) of a ray goes, with the squares of
-/// distances for `t`.
+/// Offers `nearest` the leaves of a tree of bundles, near ones first: the walk of a ray, with the squares of distances for `t`.
 #[inline(always)]
 pub(crate) fn search_wide<S: Simd + Width<W>, const W: usize>(
     s: S,
@@ -55,28 +54,19 @@ pub(crate) fn search_wide<S: Simd + Width<W>, const W: usize>(
     nearest: &mut impl Seek,
 ) {
     let mut columns = Columns::<ENOUGH_ROOM>::UNWRITTEN;
-    let (mut stack, mut bound) = (Stack::new(&mut columns), f32::INFINITY);
-    let mut at = ChildRef::ROOT;
+    let mut walk = Walk::new(&mut columns, f32::INFINITY);
     loop {
-        while !at.is_leaf() {
-            let Some(bundle) = bundles.get(at.bundle_number()) else { return };
-            let (mask, square) = nearest.around().boxes::<S, W>(s, &bundle.walls);
-            at = if mask & mask.wrapping_sub(1) == 0 {
-                let only = bundle.refs.get(mask.trailing_zeros() as usize);
-                only.copied().unwrap_or_else(|| stack.pop())
-            } else {
-                let closest = stack.push_but_nearest(s, mask, square, &bundle.refs);
-                closest.unwrap_or(ChildRef::NONE)
-            };
+        while !walk.at().is_leaf() {
+            let Some(bundle) = bundles.get(walk.at().bundle_number()) else { return };
+            let entered = nearest.around().boxes::<S, W>(s, &bundle.walls);
+            if !walk.go_on(s, bundle, entered, true) {
+                return;
+            }
         }
-        if at == ChildRef::NONE {
+        if walk.at() == ChildRef::NONE {
             return;
         }
-        nearest.block(at.leaf_block(), u32::MAX);
-        if nearest.around().narrow_bound() < bound {
-            bound = nearest.around().narrow_bound();
-            stack.cull(s, bound);
-        }
-        at = stack.pop();
+        nearest.block(walk.at().leaf_block(), u32::MAX);
+        walk.leave(s, nearest.around().narrow_bound(), true);
     }
 }

@@ -57,7 +57,7 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         } else {
             boxes.entered::<false>(&bundle.walls, t_bounds)
         };
-        self.go_on::<S, Q, W>(s, bundle, mask, near)
+        self.go_on(s, bundle, (mask, near), Q::ORDERED)
     }
 
     /// Goes from the bundle at hand to what comes next; false if it does not.
@@ -97,22 +97,22 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         self.at != ChildRef::NONE
     }
 
-    /// Goes from a bundle to the nearest of the children in the lanes of `mask`, and comes back to the others later; false
-    /// when there is no room.
+    /// Goes from a bundle to one of the children in the lanes of a mask, and comes back to the others later: if they are `ordered`,
+    /// to the nearest; false when there is no room.
     #[inline(always)]
-    pub fn go_on<S: Width<W>, Q: Query, const W: usize>(
+    pub fn go_on<S: Width<W>, const W: usize>(
         &mut self,
         s: S,
         bundle: &Bundle<W>,
-        mask: u32,
-        near: S::V,
+        (mask, near): (u32, S::V),
+        ordered: bool,
     ) -> bool {
         if mask & mask.wrapping_sub(1) == 0 {
             let only = bundle.refs.get(mask.trailing_zeros() as usize);
             self.at = only.copied().unwrap_or_else(|| self.stack.pop());
             return true;
         }
-        let next = if Q::ORDERED {
+        let next = if ordered {
             self.stack.push_but_nearest(s, mask, near, &bundle.refs)
         } else {
             // Without a bound that moves, it does not matter where they are entered.
@@ -134,14 +134,14 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         if leaves.intersect_whole(s, self.at.leaf_block(), ray, query) {
             return true;
         }
-        self.leave::<S, Q>(s, query.t_bound());
+        self.leave(s, query.t_bound(), Q::ORDERED);
         false
     }
 
     /// Goes on from a leaf; nothing beyond `t_bound` is of interest any more.
     #[inline(always)]
-    pub fn leave<S: Simd, Q: Query>(&mut self, s: S, t_bound: f32) {
-        if Q::ORDERED && t_bound < self.t_bound {
+    pub fn leave<S: Simd>(&mut self, s: S, t_bound: f32, ordered: bool) {
+        if ordered && t_bound < self.t_bound {
             self.t_bound = t_bound;
             self.stack.cull(s, t_bound);
         }

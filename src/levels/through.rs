@@ -113,7 +113,7 @@ fn walk<S: Simd>(
         if left < limit {
             (limit, t_bound) = (left, in_frame(left));
         }
-        walk.leave::<S, Reach<'_, '_, '_, ()>>(s, t_bound);
+        walk.leave(s, t_bound, true);
     }
 }
 

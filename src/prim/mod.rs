@@ -248,7 +248,8 @@ impl<Q: Query> Kernel for Look<'_, Q> {
         let alone = found.candidates.is_power_of_two();
         if Q::CAN_WAIT && alone && found.sure != 0 {
             let lane = found.sure.trailing_zeros();
-            if query.may_wait(ray, number, lane, found.part(s, ray, lane)) {
+            let place = Place::of_lane(number, block.first, lane);
+            if query.may_wait(ray, place, found.part(s, ray, lane)) {
                 return false;
             }
         }
@@ -294,8 +295,8 @@ impl<Q: Query> Kernel for Several<'_, Q> {
             let lane = found.nearest(s, rest);
             rest &= !(1 << lane);
             let sure = sure >> lane & 1 == 1;
-            let waits =
-                Q::CAN_WAIT && sure && query.may_wait(ray, number, lane, found.part(s, ray, lane));
+            let place = Place::of_lane(number, block.first, lane);
+            let waits = Q::CAN_WAIT && sure && query.may_wait(ray, place, found.part(s, ray, lane));
             let certain = Certain { sure, inside: false };
             if !waits && consider(block, number, lane, certain, ray, query) {
                 return true;

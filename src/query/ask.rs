@@ -2,6 +2,7 @@
 
 use super::waiting::Waiting;
 use super::{Decide, Filter, Meets, Query, SphereLane, TriangleLane, Watch};
+use crate::block::leaf::Place;
 use crate::ray::{Interval, PreparedRay};
 use crate::simd::SMALL;
 
@@ -85,14 +86,11 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
     const CAN_WAIT: bool = D::ANY_BOXES && WAITS > 0;
 
     #[inline(always)]
-    fn may_wait(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
-        let waits = self.waiting.first_mut().is_some_and(|w| w.takes(ray, block, lane, part));
+    fn may_wait(&mut self, ray: &PreparedRay, place: Place, part: Interval<f32>) -> bool {
+        let waits = self.waiting.first_mut().is_some_and(|w| w.takes(ray, place, part));
         if waits {
             self.t_bound = part.far;
-            // The name of what is likely to win comes from far away, and is asked for last.
-            if let Some(lane) = self.waiting() {
-                self.filter.fetch(lane.place);
-            }
+            self.filter.fetch(place);
         }
         waits
     }

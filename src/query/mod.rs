@@ -168,10 +168,10 @@ pub(crate) trait Query {
     /// Whether triangles that surely are met may wait until the end.
     const CAN_WAIT: bool = false;
 
-    /// A triangle in a lane of a block between whose edges the ray surely passes, in this part of itself: whether it may wait,
-    /// and need not be considered.
+    /// A triangle that is stored there, between whose edges the ray surely passes in this part of itself: whether it may wait, and
+    /// need not be considered.
     #[inline(always)]
-    fn may_wait(&mut self, _: &PreparedRay, _block: u32, _lane: u32, _: Interval<f32>) -> bool {
+    fn may_wait(&mut self, _: &PreparedRay, _: Place, _: Interval<f32>) -> bool {
         false
     }
 

@@ -9,33 +9,33 @@ use crate::ray::{Interval, PreparedRay};
 ///
 /// Most rays that hit anything compute one `t` so, and no node waits for it.
 pub(super) struct Waiting {
-    /// The number of its block; [`NOBODY`], which no block has, if nothing waits.
-    block: u32,
-    lane: u32,
+    /// Where it is stored; [`NOWHERE`] if nothing waits.
+    place: Place,
     /// What is met before this `t` of the frame comes before all that was met so far.
     first_before: f32,
 }
 
-const NOBODY: u32 = u32::MAX;
+/// No block has this number.
+const NOWHERE: Place = Place { block: u32::MAX, lane: 0, entry: 0 };
 
 impl Waiting {
     /// Nothing, and nothing ever if the filter asks more of a triangle than that it is met.
     #[inline(always)]
     pub fn new(filter: &Filter, t_max: f32) -> Self {
         let first_before = if filter.sees_all() { t_max } else { f32::NEG_INFINITY };
-        Waiting { block: NOBODY, lane: 0, first_before }
+        Waiting { place: NOWHERE, first_before }
     }
 
-    /// Takes the triangle in this lane, which the ray surely meets in this part of itself, if that comes first and is within the
+    /// Takes the triangle that is stored there, which the ray surely meets in this part of itself, if that comes first and is within the
     /// ray's limits; whether it does.
     ///
     /// The frame's limits are outside of the given ones by less than the part is wider than what is real: what lies strictly between
     /// them is within those.
     #[inline(always)]
-    pub fn takes(&mut self, ray: &PreparedRay, block: u32, lane: u32, part: Interval<f32>) -> bool {
+    pub fn takes(&mut self, ray: &PreparedRay, place: Place, part: Interval<f32>) -> bool {
         let first = ray.t_min < part.near && part.far < self.first_before;
         if first {
-            *self = Waiting { block, lane, first_before: part.near };
+            *self = Waiting { place, first_before: part.near };
         }
         first
     }
@@ -46,11 +46,11 @@ impl Waiting {
         &self,
         blocks: impl FnOnce() -> &'m [TriangleBlock],
     ) -> Option<TriangleLane<'m>> {
-        if self.block == NOBODY {
+        let place = self.place;
+        if place.block == NOWHERE.block {
             return None;
         }
-        let block = blocks().get(self.block as usize)?;
-        let place = Place::of_lane(self.block, block.first, self.lane);
+        let block = blocks().get(place.block as usize)?;
         Some(TriangleLane { block, place, sure: true, inside: true })
     }
 
@@ -61,7 +61,7 @@ impl Waiting {
         blocks: impl FnOnce() -> &'m [TriangleBlock],
     ) -> Option<TriangleLane<'m>> {
         let lane = self.lane(blocks);
-        (self.block, self.first_before) = (NOBODY, f32::NEG_INFINITY);
+        (self.place, self.first_before) = (NOWHERE, f32::NEG_INFINITY);
         lane
     }
 }

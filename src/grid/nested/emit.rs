@@ -186,27 +186,28 @@ fn join_blocks(packed: &[Option<Packed>; PARTS], blocks: &mut [TriangleBlock]) -
 
 /// Moves the numbers of the parts together, as triangles that are named take none, and lets blocks name them where they now are.
 fn join_ids(packed: &[Option<Packed>; PARTS], used: &Used, parts: &mut PartsMut) {
-    let mut before = Used { ids: [0, used.ids[0]], ..Used::default() };
-    let parts_of = |kind: usize| packed.iter().flatten().map(move |part| (part, part.ids_at[kind]));
-    for (part, at) in parts_of(0) {
-        let fall = at - before.ids[0];
-        if fall > 0 {
-            parts.prim_ids.copy_within(at..at + part.used.ids[0], before.ids[0]);
+    let packed = || packed.iter().flatten();
+    let of_part = |part: &Packed| (part.ids_at[0], part.used.ids[0], part.used.triangle_blocks);
+    let firsts = parts.triangle_blocks.iter_mut().map(|block| &mut block.first);
+    join(packed().map(of_part), 0, parts.prim_ids, firsts);
+    let of_part = |part: &Packed| (part.ids_at[1], part.used.ids[1], part.used.sphere_blocks);
+    let firsts = parts.sphere_blocks.iter_mut().map(|block| &mut block.first);
+    join(packed().map(of_part), used.ids[0], parts.prim_ids, firsts);
+}
+
+/// Moves numbers together from `to` on: of each part, where they are, how many, and how many blocks name them by their `firsts`.
+fn join<'b>(
+    parts: impl Iterator<Item = (usize, usize, usize)>,
+    mut to: usize,
+    ids: &mut [u32],
+    mut firsts: impl Iterator<Item = &'b mut u32>,
+) {
+    for (at, count, blocks) in parts {
+        if at > to {
+            ids.copy_within(at..at + count, to);
         }
-        let blocks = parts.triangle_blocks.iter_mut().skip(before.triangle_blocks);
-        blocks.take(part.used.triangle_blocks).for_each(|block| block.first -= fall as u32);
-        before.ids[0] += part.used.ids[0];
-        before.triangle_blocks += part.used.triangle_blocks;
-    }
-    for (part, at) in parts_of(1) {
-        let fall = at - before.ids[1];
-        if fall > 0 {
-            parts.prim_ids.copy_within(at..at + part.used.ids[1], before.ids[1]);
-        }
-        let blocks = parts.sphere_blocks.iter_mut().skip(before.sphere_blocks);
-        blocks.take(part.used.sphere_blocks).for_each(|block| block.first -= fall as u32);
-        before.ids[1] += part.used.ids[1];
-        before.sphere_blocks += part.used.sphere_blocks;
+        firsts.by_ref().take(blocks).for_each(|first| *first -= (at - to) as u32);
+        to += count;
     }
 }
 

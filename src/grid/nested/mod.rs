@@ -38,7 +38,7 @@ const WORK: u64 = 32;
 const TRIES: u32 = 10;
 
 /// Bytes for each primitive that a build may use beyond what one cell takes.
-const SPARE: usize = 64;
+const SPARE: usize = 56;
 /// And for the whole scene.
 const SPARE_AT_LEAST: usize = 16 * 1024;
 
