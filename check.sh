@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Everything that must hold before a change lands. Needs Rust and a C compiler; installs the rest
-# (Debian packages by name). A quarter of an hour on two idle cores, or a little more.
+# (Debian packages by name). A quarter of an hour on two idle cores.
 #
 #   ./check.sh            all of it, but for most of the other processors
 #   ./check.sh all        these too
@@ -9,14 +9,23 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 export CARGO_TERM_COLOR=never
-# Nothing here is compiled a second time, and what that would be faster by fills the disk.
-export CARGO_INCREMENTAL=0
+# Nothing here is compiled a second time, and what that would be faster by fills the disk; so do line numbers.
+export CARGO_INCREMENTAL=0 CARGO_PROFILE_TEST_DEBUG=false CARGO_PROFILE_RELEASE_DEBUG=false
+built=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 
-# What every step with tests asks for: other features of any crate would compile the core once more, which takes minutes.
+# The core is compiled twice for this machine: with assertions for the tests and the C programs, and as it is released for the C library
+# and the tools. It would be once more, which takes minutes, if two steps asked for other features or profiles of any crate.
 all=(--workspace --features raykern/capi)
+tools=(-p raykern-harness -p raykern-bench --features raykern-bench/embree)
 
 # Optimised as programs are, but by all cores: this takes half as long, and what is measured here means nothing.
 released() { CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 cargo "$@"; }
+
+# One of the programs.
+tool() {
+    released build --release "${tools[@]}" --bins
+    "$built/release/$1" "${@:2}"
+}
 
 step_install() {
     local missing=()
@@ -39,8 +48,8 @@ step_format() {
 }
 
 step_clippy() {
-    cargo clippy --workspace --all-targets -- -D warnings
-    cargo clippy -p raykern --features capi --all-targets -- -D warnings
+    cargo clippy "${all[@]}" --all-targets -- -D warnings
+    cargo clippy -p raykern --lib -- -D warnings
     cargo clippy -p raykern --no-default-features --features libm,capi --lib -- -D warnings
     # By its manifest and from here, so that the flags for fuzzing are left out.
     cargo clippy --manifest-path fuzz/Cargo.toml --all-targets -- -D warnings
@@ -97,45 +106,57 @@ step_targets() { targets/run.sh short; }
 # Each of them.
 step_all_targets() { targets/run.sh all; }
 
-# Each fuzz target for ten seconds, from nothing; fuzz/README.md says how to run them for longer. Without vector instructions,
-# which take minutes to compile with all that a fuzzer counts: tests/fuzz_cases.rs has the same checks with them.
+# Each fuzz target from nothing, as many inputs as take it ten seconds on a core of its own; fuzz/README.md says how to run them for
+# longer. An input may take 30 seconds here, where a core is shared. Without vector instructions, which take minutes to compile with all
+# that a fuzzer counts: tests/fuzz_cases.rs has the same checks with them.
 step_fuzz() (
+    export RUSTC_BOOTSTRAP=1 CARGO_TARGET_DIR=$built/fuzz
     cd fuzz
-    export RUSTC_BOOTSTRAP=1
     released build --release --config 'build.rustflags=["--cfg=raykern_portable"]'
     findings=$(mktemp -d)
+    hunt() { # target, inputs
+        "$CARGO_TARGET_DIR/x86_64-unknown-linux-gnu/release/$1" "-artifact_prefix=$findings/" "-runs=$2" \
+            -max_total_time=120 -max_len=2048 -len_control=0 -timeout=30 >"$findings/$1.log" 2>&1
+    }
+    hunt mesh 4000 & mesh=$!
+    hunt ray 1300 & ray=$!
+    hunt block 5000 & block=$!
+    found=
     for target in mesh ray block; do
         echo "-- $target"
-        if ! "target/x86_64-unknown-linux-gnu/release/$target" "-artifact_prefix=$findings/" \
-            -max_total_time=10 -max_len=2048 -len_control=0 -timeout=10 >"$findings/log" 2>&1; then
-            grep -a -A2 panicked "$findings/log" || tail -n 40 "$findings/log"
-            echo "a finding: fuzz/README.md, with the input in $findings" >&2
-            exit 1
+        if wait "${!target}"; then
+            tail -n 1 "$findings/$target.log"
+        else
+            grep -a -A2 panicked "$findings/$target.log" || tail -n 40 "$findings/$target.log"
+            found=yes
         fi
-        tail -n 1 "$findings/log"
     done
+    if [ -n "$found" ]; then
+        echo "a finding: fuzz/README.md, with the input in $findings" >&2
+        exit 1
+    fi
+    rm -r "$findings"
 )
 
-# A million rays a scene against Embree, every difference judged exactly.
+# A million rays a scene through the released C library and through Embree, every difference judged exactly.
 step_embree() {
-    released test --release -p raykern-harness --features embree,raykern/capi --test compare_embree -- --nocapture
+    CARGO_PROFILE_RELEASE_CODEGEN_UNITS=16 cargo test "${all[@]}" --test compare_embree -- --ignored --nocapture
 }
 
 # Rays that look for trouble, all answers judged exactly; Embree on the same rays.
-step_stress() {
-    released run --release -p raykern-harness --features raykern/capi --bin stress -- --rays 200000 --embree
-}
+step_stress() { tool stress --rays 200000 --embree; }
 
 # The main job, cut short.
-step_compare() { released run --release --features capi --example compare -- --runs 2 --budget 20 --out target/compare-check; }
+step_compare() {
+    cargo build --profile test "${all[@]}" --example compare
+    "$built/debug/examples/compare" --runs 2 --budget 20 --out "$built/compare-check"
+}
 
 # The comparison with Embree, cut short: its answers are checked, its times mean nothing here.
-step_bench() { released run --release -p raykern-bench --features embree -- --quick; }
+step_bench() { tool raykern-bench --quick; }
 
 # Every method on ordinary rays and stress families, every answer judged, and the page.
-step_report() {
-    released run --release -p raykern-bench --features embree --bin report -- --quick --out target/report-check
-}
+step_report() { tool report --quick --out "$built/report-check"; }
 
 steps=(install format clippy build test backends docs header c targets fuzz embree stress compare bench report)
 case ${1:-} in
@@ -143,9 +164,59 @@ case ${1:-} in
 all) steps=("${steps[@]/#targets/all_targets}") ;;
 *) steps=("$@") ;;
 esac
+
+run_steps() {
+    local step started
+    for step in "$@"; do
+        started=$SECONDS
+        echo "== $step"
+        "step_$step"
+        echo "== $step: $((SECONDS - started)) s"
+    done
+}
+
+# These have compilers and folders of their own, and much in them is for one core alone: they fill the gaps of the others.
+aside=() rest=()
 for step in "${steps[@]}"; do
-    started=$SECONDS
-    echo "== $step"
-    "step_$step"
-    echo "== $step: $((SECONDS - started)) s"
+    case $step in
+    targets | all_targets | fuzz) aside+=("$step") ;;
+    *) rest+=("$step") ;;
+    esac
 done
+# Before anything else installs anything.
+[ "${rest[0]:-}" != install ] || { run_steps install; rest=("${rest[@]:1}"); }
+if [ ${#aside[@]} -eq 0 ] || [ ${#rest[@]} -eq 0 ]; then
+    run_steps "${rest[@]}" "${aside[@]}"
+    exit
+fi
+
+printed=$(mktemp)
+echo "== ${aside[*]}: aside, printed when all of it is done"
+# In a process group of its own, so that none of it outlives this script.
+set -m
+{
+    renice -n 5 "$BASHPID" >/dev/null
+    run_steps "${aside[@]}"
+} >"$printed" 2>&1 &
+aside_group=$!
+set +m
+trap 'kill -- "-$aside_group" 2>/dev/null || true; rm -f "$printed"' EXIT
+
+# Waits for it; prints it whole, and fails if it failed.
+join_aside() {
+    local status=0
+    wait "$aside_group" || status=$?
+    trap - EXIT
+    cat "$printed"
+    rm "$printed"
+    [ "$status" -eq 0 ] || echo "failed: ${aside[*]}" >&2
+    return "$status"
+}
+
+for step in "${rest[@]}"; do
+    run_steps "$step"
+    # A failure there is told at once.
+    [ ! -e "$printed" ] || kill -0 "$aside_group" 2>/dev/null || join_aside
+done
+[ ! -e "$printed" ] || join_aside
+echo "all of it: $SECONDS s"

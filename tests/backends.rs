@@ -10,6 +10,7 @@ use common::{All, bits, odd_models};
 use raykern::{Accel, Backend, Precision, QueryOptions, Ray};
 use raykern_harness::make;
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::threads::map;
 
 /// What a backend answers to all rays in both precisions.
 fn answers(accel: &Accel, rays: &[Ray], backend: Backend) -> Vec<(Option<[u32; 6]>, bool)> {
@@ -19,7 +20,7 @@ fn answers(accel: &Accel, rays: &[Ray], backend: Backend) -> Vec<(Option<[u32; 6
         let options = QueryOptions { precision, ..Default::default() };
         (bits(accel.intersect_with(ray, &options)), accel.occluded_with(ray, &options))
     };
-    rays.iter().flat_map(|ray| precisions.map(|precision| ask(ray, precision))).collect()
+    map(rays, |ray| precisions.map(|precision| ask(ray, precision))).concat()
 }
 
 /// What it finds closest to the origins of some of them.
@@ -29,7 +30,7 @@ fn closest(accel: &Accel, rays: &[Ray], backend: Backend) -> Vec<Option<[u32; 3]
         let hit = accel.closest_point(ray.origin, f32::INFINITY, &QueryOptions::default())?;
         Some([hit.distance.to_bits(), hit.geometry, hit.prim])
     };
-    rays.iter().step_by(7).map(ask).collect()
+    map(rays.iter().step_by(7), ask)
 }
 
 #[test]

@@ -10,6 +10,7 @@ use raykern::{Backend, Ray};
 use raykern_harness::make;
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::threads::each;
 
 fn same_in_all(model: &Model, rays: &[Ray]) -> usize {
     let all = All::of(model);
@@ -39,7 +40,7 @@ fn incoherent_rays() {
 #[test]
 fn rays_of_all_families() {
     let made = make::ALL.into_iter().map(|(name, make)| (name, make(2_000)));
-    for (name, model) in odd_models().into_iter().chain(made) {
+    each(odd_models().into_iter().chain(made), |(name, model)| {
         let families = [Family::ORDINARY.as_slice(), &Family::HOSTILE, &[Family::Invalid]].concat();
         let rays: Vec<Vec<Ray>> = (0..)
             .zip(&families)
@@ -51,7 +52,7 @@ fn rays_of_all_families() {
         for (kind, accel) in &all.accels() {
             same_in_a_batch(&format!("{name} {kind}"), accel, &rays);
         }
-    }
+    });
 }
 
 #[test]

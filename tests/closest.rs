@@ -10,6 +10,7 @@ use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
 use raykern_harness::oracle::Oracle;
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::threads::each;
 
 /// What a distance may be off, for each unit of it and of the primitive's size.
 const BOUND: f64 = 1.0 / (1u64 << 46) as f64;
@@ -70,7 +71,7 @@ fn check(all: &All, oracle: &Oracle, point: [f32; 3], radius: f32, options: &Que
 #[test]
 fn made_and_odd_scenes() {
     let models = make::ALL.map(|(name, make)| (name, make(300)));
-    for (name, model) in models.into_iter().chain(odd_models()) {
+    each(models.into_iter().chain(odd_models()), |(name, model)| {
         let (all, oracle) = (All::of(&model), Oracle::new(&model));
         let mut found = 0;
         // Origins of rays are points: around the scene, inside, on surfaces, exactly on vertices, and far away.
@@ -95,7 +96,7 @@ fn made_and_odd_scenes() {
         }
         println!("{name}: {found}");
         assert!(name == "none" || found > 40, "{name}: {found}");
-    }
+    });
 }
 
 /// Small whole numbers, where many primitives are equally close: the first of them wins.

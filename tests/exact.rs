@@ -10,6 +10,7 @@ use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::threads::map;
 
 /// Judges `count` rays of a family in the widest BVH; `agree.rs` answers for the others.
 fn tally(model: &Model, family: Family, count: usize, seed: u64) -> Tally {
@@ -47,17 +48,18 @@ fn ordinary_rays_are_answered_exactly() {
 /// Hostile rays are answered exactly as well: the ceiling of every family is zero.
 #[test]
 fn hostile_rays_are_answered_exactly() {
-    let mut wrong = 0;
     println!("{:32} {}", "", Tally::COLUMNS);
     let models = make::ALL.map(|(name, make)| (name, make(1_000)));
-    for (name, model) in models.into_iter().chain(odd_models()) {
+    let wrong = map(models.into_iter().chain(odd_models()), |(name, model)| {
+        let mut wrong = 0;
         for (seed, family) in Family::HOSTILE.into_iter().enumerate() {
             let tally = tally(&model, family, 200, seed as u64);
             println!("{:32} {tally}", format!("{name} {family:?}"));
             wrong += tally.wrong();
         }
-    }
-    assert_eq!(wrong, 0);
+        wrong
+    });
+    assert_eq!(wrong.into_iter().sum::<u64>(), 0);
 }
 
 /// Masks, sides and skipped primitives, over meshes and spheres that are doubled in part.

@@ -14,6 +14,7 @@ use raykern::{
 use raykern_harness::make;
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::threads::each;
 use std::mem::MaybeUninit;
 
 /// A list, and BVHs of every layout and quality, to be refitted.
@@ -80,7 +81,7 @@ fn with_memory<R>(size: usize, f: impl FnOnce(&mut [MaybeUninit<u8>]) -> R) -> R
 #[test]
 fn answers_are_those_of_a_structure_built_anew() {
     choose_backend();
-    for (name, model) in models() {
+    each(models(), |(name, model)| {
         let mut built: Vec<_> = (all_options().into_iter())
             .map(|(kind, options)| {
                 let built = model.with_scene(|scene| OwnedAccel::bvh(scene, &options));
@@ -109,7 +110,7 @@ fn answers_are_those_of_a_structure_built_anew() {
                 assert!(built.accel().block() == *original, "{name} {how} {kind}: back");
             }
         }
-    }
+    });
 }
 
 /// A structure over what cannot be hit yet.

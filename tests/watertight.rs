@@ -13,6 +13,7 @@ use raykern_harness::make;
 use raykern_harness::model::Model;
 use raykern_harness::oracle::Oracle;
 use raykern_harness::rays::{Family, RayMaker};
+use raykern_harness::threads::each;
 
 const EXACT: QueryOptions =
     QueryOptions { precision: Precision::Exact, mask: 0, facing: Facing::Both, skip: None };
@@ -121,17 +122,17 @@ fn table(name: &str, model: &Model, rays: usize) -> Seen {
 
 #[test]
 fn made_scenes_are_never_missed() {
-    for (name, make) in make::ALL {
+    each(make::ALL, |(name, make)| {
         let seen = table(name, &make(1_000), 150);
         assert!(seen.hits > 1_000, "{name}");
-    }
+    });
 }
 
 #[test]
 fn odd_scenes_are_never_missed() {
-    for (name, model) in odd_models() {
+    each(odd_models(), |(name, model)| {
         table(name, &model, 150);
-    }
+    });
 }
 
 /// Nothing stands behind a single triangle or sphere: what is missed at its edge is missed. The judge
