@@ -255,3 +255,45 @@ impl Sample {
         cells.chunk_by(|a, b| a == b).map(pairs).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Aabb;
+    use crate::scene::SphereSet;
+    use std::vec::Vec;
+
+    /// Twenty small spheres at each of `17^3` places, those of a place one after the other or each place's after 4,912 others'.
+    fn spread(together: bool) -> Spread {
+        const PLACES: u32 = 17 * 17 * 17;
+        let place = |i: u32| if together { i / 20 } else { i % PLACES };
+        let at = |place: u32| [place % 17, place / 17 % 17, place / 289].map(|k| k as f32);
+        let spheres: Vec<_> =
+            (0..20 * PLACES).map(|i| at(place(i))).map(|[x, y, z]| [x, y, z, 0.01]).collect();
+        let census = Census {
+            bounds: Aabb { lower: [-0.01; 3], upper: [16.01; 3] },
+            longest: 0.02,
+            mesh_count: 0,
+            triangle_limit: 0,
+            prim_limit: 20 * PLACES,
+            triangle_count: 0,
+            sphere_count: 20 * PLACES,
+            ignored_count: 0,
+            is_index: false,
+            refit: false,
+        };
+        Spread::of(&Scene::new(&[], &[SphereSet::new(&spheres)]), &census)
+    }
+
+    #[test]
+    fn a_sample_tells_how_long_lists_are_in_any_order() {
+        for together in [true, false] {
+            let Spread { mean, cells, in_order, unevenness, .. } = spread(together);
+            assert!((7.0..30.0).contains(&mean), "{mean} {together}");
+            assert!((1.0..1.5).contains(&cells), "{cells}");
+            assert!((0.99..1.1).contains(&unevenness), "{unevenness}");
+            let near = if together { 0.9..0.99 } else { 0.0..0.01 };
+            assert!(near.contains(&in_order), "{in_order} {together}");
+        }
+    }
+}

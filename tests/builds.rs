@@ -374,8 +374,11 @@ fn the_choice_follows_the_rays_and_the_scene() {
         let place = [i % 2, i / 2 % 2, i / 4].map(|x| 3.0 * f64::from(x));
         crowd.meshes.push(make::blob(30_000, i.into()).placed(0.15, place));
     }
-    let mut on_a_floor = mixed(&make::plane(30_000).into());
-    on_a_floor.meshes.push(make::plane(2).placed(10.0, [-5.0, -5.0, -1.0]));
+    let mut in_order: Model = make::plane(30_000).into();
+    let mut on_a_floor = mixed(&in_order);
+    for model in [&mut in_order, &mut on_a_floor] {
+        model.meshes.push(make::plane(2).placed(10.0, [-5.0, -5.0, -1.0]));
+    }
     let (fast, balanced, best) = (Quality::Fast, Quality::Balanced, Quality::Best);
     let cases = [
         ("many", &surface, balanced, 0.0, "balanced"),
@@ -401,6 +404,7 @@ fn the_choice_follows_the_rays_and_the_scene() {
         ("very uneven", &on_a_floor, balanced, 0.01, "uniform"),
         ("very uneven", &on_a_floor, balanced, 0.2, "nested"),
         ("very uneven", &on_a_floor, balanced, 1.0, "fast"),
+        ("very uneven, in order", &in_order, balanced, 0.2, "fast"),
         ("a handful", &handful, balanced, 0.05, "list"),
     ];
     let wrong: Vec<_> = cases

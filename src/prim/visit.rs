@@ -70,17 +70,6 @@ fn show<V: Visitor + ?Sized>(scene: &Scene, range: Range<u32>, visitor: &mut V) 
     }
 }
 
-/// Calls `f` with each primitive in `range` that can be hit; with `sound`, all of them can.
-#[inline]
-pub(crate) fn for_each_prim_in(
-    scene: &Scene,
-    range: Range<u32>,
-    sound: bool,
-    mut f: impl FnMut(Prim),
-) {
-    for_each_named_in(scene, range, sound, |prim, _| f(prim));
-}
-
 /// Calls `f` with each primitive in `range` that can be hit, and with what knows its vertices by name; with `sound`, all
 /// of them can.
 #[inline]
