@@ -224,7 +224,7 @@ impl Sample {
                 self.add(grid, of_this, corners(i + 1));
             }
             self.random = self.random.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
-            i += 1 + ((self.random >> 32) * u64::from(self.most) >> 32) as usize;
+            i += 1 + (((self.random >> 32) * u64::from(self.most)) >> 32) as usize;
         }
         i - count
     }
