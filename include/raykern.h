@@ -182,7 +182,7 @@ typedef bool (*RtProgress)(void *user, float done);
 // What a build may choose. Zero in every field but the first suits most scenes.
 typedef struct RtBuildOptions {
     uint32_t struct_size;
-    // One of `RT_QUALITY_`.
+    // One of `RT_QUALITY_`. `rt_build` takes fast for balanced where rays are few.
     uint32_t quality;
     // One of `RT_LAYOUT_`, for a BVH.
     uint32_t layout;
@@ -206,7 +206,8 @@ typedef struct RtBuildOptions {
     float grid_density;
     // How deep grids may be nested, the outermost counted, up to 8; 0: 8.
     uint32_t grid_depth;
-    // For `rt_build`, how many rays for each primitive will be traced before the next build; not negative. 0: many.
+    // For `rt_build`, how many rays for each primitive will be traced before the next build; not negative. 0: many. Below 6:
+    // few.
     float rays_per_prim;
 } RtBuildOptions;
 

@@ -7,7 +7,7 @@ use crate::accel::{Accel, Layout};
 use crate::block::Census;
 use crate::bvh::{self, Effort, How};
 use crate::caller::{Caller, Threads};
-use crate::choice::suits_grid;
+use crate::choice::{Suited, are_few, suited};
 use crate::error::BuildError;
 use crate::grid::{self, GridKind, GridOptions};
 use crate::instance::{Counted, Placed, fixed_size, write};
@@ -60,7 +60,7 @@ pub enum PlainList {
 /// For the same choices a block has the same bytes on every machine and with any number of threads.
 #[derive(Clone, Copy, Default)]
 pub struct BuildOptions<'a> {
-    /// Time spent on a BVH; grids have but one way.
+    /// Time spent on a BVH; grids have but one way. [`build()`] takes `Fast` for `Balanced` where rays are few.
     pub quality: Quality,
     /// The layout of a BVH.
     pub layout: Layout,
@@ -71,7 +71,7 @@ pub struct BuildOptions<'a> {
     pub plain_list: PlainList,
     /// How a grid divides space.
     pub grid: GridOptions,
-    /// For [`build`], how many rays for each primitive will be traced before the next build; zero means many.
+    /// For [`build`], how many rays for each primitive will be traced before the next build; zero means many. Below six are few.
     pub rays_per_prim: f32,
     /// Threads that the build may use, and its `needs`; none of them is kept.
     pub threads: Option<&'a dyn Threads>,
@@ -190,6 +190,7 @@ struct Plan {
     survey: Survey,
     census: Census,
     structure: Structure,
+    quality: Quality,
     size: usize,
     minimum: usize,
     grid: Option<grid::Needs>,
@@ -221,12 +222,22 @@ impl Plan {
         let asked_to = REFIT && options.refit;
         let refit = asked_to && scene.instance_count() == 0 && scene.boxes().is_none();
         let kept = if refit { census.for_refit() } else { census };
+        let few = asked == Structure::Automatic && !refit && are_few(options.rays_per_prim);
+        let quality = match options.quality {
+            Quality::Balanced if few => Quality::Fast,
+            asked => asked,
+        };
+        let grid = |kind| Structure::Grid(GridOptions { kind, ..options.grid });
         let structure = match asked {
             _ if kept.hittable() <= handful => Structure::List,
             Structure::Grid(_) if census.hittable() == 0 => Structure::List,
-            Structure::Automatic if refit => options.bvh(),
-            Structure::Automatic if GRID && suits_grid(scene, &census, options.rays_per_prim) => {
-                Structure::Grid(GridOptions { kind: GridKind::Uniform, ..options.grid })
+            Structure::Automatic if GRID && few => {
+                let with_care = quality == Quality::Best;
+                match suited(scene, &census, options.rays_per_prim, with_care) {
+                    Suited::Uniform => grid(GridKind::Uniform),
+                    Suited::Nested => grid(GridKind::Nested),
+                    Suited::Bvh => options.bvh(),
+                }
             }
             Structure::Automatic => options.bvh(),
             asked => asked,
@@ -244,19 +255,13 @@ impl Plan {
             Structure::Wide(width) if WIDE => bvh::needs_wide(&survey, &census, width)?,
             Structure::Grid(_) | Structure::Wide(_) => return Err(BuildError::LeftOut),
         };
-        Ok(Plan { survey, census, structure, size, minimum, grid: planned })
+        Ok(Plan { survey, census, structure, quality, size, minimum, grid: planned })
     }
 
     /// Builds into zero bytes, aligned and at least the minimum; returns the size of the block.
-    fn run(
-        &self,
-        scene: &Scene,
-        options: &BuildOptions,
-        caller: &Caller,
-        bytes: &mut [u8],
-    ) -> Result<usize, BuildError> {
+    fn run(&self, scene: &Scene, caller: &Caller, bytes: &mut [u8]) -> Result<usize, BuildError> {
         let Plan { survey, census, .. } = self;
-        let effort = match options.quality {
+        let effort = match self.quality {
             Quality::Fast => Effort::FAST,
             Quality::Balanced => Effort::BALANCED,
             Quality::Best => Effort::BEST,
@@ -358,7 +363,7 @@ impl<'s> Job<'s> {
         let room = room / ALIGNMENT * ALIGNMENT;
         let short = BuildError::OutOfMemory { minimum };
         let own_bytes = bytes.get_mut(..room).ok_or(short)?;
-        let built = own.run(scene, options, &caller, own_bytes);
+        let built = own.run(scene, &caller, own_bytes);
         caller.done(1.0).ok_or(BuildError::Cancelled)?;
         let size = match level {
             Some(level) => level.run(options, built?, bytes),
@@ -384,7 +389,7 @@ impl LevelPlan<'_> {
             let scene = Scene::of_boxes(boxes);
             let census = Census::take(&scene, &index.survey, &caller).ok()?;
             let index = Plan { census, ..*index };
-            index.run(&scene, options, &caller, rest.get_mut(..room)?).ok()
+            index.run(&scene, &caller, rest.get_mut(..room)?).ok()
         })
     }
 }

@@ -31,7 +31,7 @@ const HOUSE: &[(&str, &[&str])] = &[
         ],
     ),
     ("point", &["block", "instance", "math", "prim", "query", "ray", "simd"]),
-    ("choice", &["block", "math", "prim", "scene"]),
+    ("choice", &["block", "math", "scene"]),
     ("list", &["block", "error", "prim", "scene"]),
     (
         "grid",

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use anyhow::{Context, Result};
 use glam::{DQuat, DVec3};
-use raykern::{BuildOptions, GridKind, GridOptions, Kind as Chosen, Layout, OwnedAccel, Precision};
+use raykern::{BuildOptions, GridKind, GridOptions, Layout, OwnedAccel, Precision, Quality};
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::render::RenderScene;
@@ -40,11 +40,11 @@ pub fn run(options: &Options, watch: &mut Watch) -> Result<Vec<SceneResult>> {
     let mut each = |name: &str, scene: Result<Loaded, String>| {
         match scene {
             Ok(scene) => {
-                let lineup = lineup(&scene.model)?;
+                let (lineup, blocks) = lineup(&scene.model)?;
                 let result = measure_lineup(name, &scene, lineup, options, watch);
                 let result = result.context(name.to_string())?;
                 report::scene(&result);
-                regrets.push((name.to_string(), regret(&result, &scene.model)?));
+                regrets.push((name.to_string(), regret(&result, &blocks, &scene.model)?));
                 results.push(result);
             }
             Err(reason) => println!("{name}: skipped: {reason}\n"),
@@ -62,18 +62,28 @@ pub fn run(options: &Options, watch: &mut Watch) -> Result<Vec<SceneResult>> {
     for (name, make) in MADE.iter().filter(|(name, _)| !options.quick && wanted(name)) {
         each(name, prepared(make(), View::Given))?;
     }
+    print_costs(&results);
     print_regrets(&regrets);
     Ok(results)
 }
 
+/// What there is to choose from, and a mark in the table of regrets for each.
+const CHOICES: [(&str, &str); 4] =
+    [("bvh", " "), ("bvh-fast", "f"), ("grid", "n"), ("uniform", "u")];
+
+/// What there is to choose from, by name.
+type Blocks = Vec<(&'static str, Rc<OwnedAccel<'static>>)>;
+
 /// The structures that there are to choose from, and the binary BVH.
-fn lineup(model: &Model) -> Result<Lineup> {
-    let mut lineup = Lineup::default();
+fn lineup(model: &Model) -> Result<(Lineup, Blocks)> {
+    let (mut lineup, mut blocks) = (Lineup::default(), Blocks::new());
     let uniform = GridOptions { kind: GridKind::Uniform, ..GridOptions::default() };
     let compact = BuildOptions { layout: Layout::Compact, ..BuildOptions::default() };
+    let fast = BuildOptions { quality: Quality::Fast, ..BuildOptions::default() };
     let exact = Precision::Exact;
     for (name, class, options) in [
         ("bvh", Class::Single(exact), BuildOptions::default()),
+        ("bvh-fast", Class::Fast, fast),
         ("bvh-compact", Class::Compact, compact),
         ("grid", Class::Grid(exact), BuildOptions::default()),
         ("uniform", Class::Grid(exact), BuildOptions { grid: uniform, ..BuildOptions::default() }),
@@ -89,23 +99,26 @@ fn lineup(model: &Model) -> Result<Lineup> {
         lineup.built(name, seconds, Some(built.accel().block().len()));
         lineup.add(name, class, Single::new(&built, exact));
         if name == "grid" {
-            lineup.add("grid batch", class, Batch(built));
+            lineup.add("grid batch", class, Batch(built.clone()));
         }
+        blocks.push((name, built));
     }
-    Ok(lineup)
+    Ok((lineup, blocks))
 }
 
-/// For each of [`RAYS_PER_PRIM`] the time of what is chosen, building and tracing, over that of the best.
-fn regret(result: &SceneResult, model: &Model) -> Result<Vec<(Chosen, f64)>> {
-    let (bvh, grids) = (cost(result, "bvh"), ["grid", "uniform"].map(|name| cost(result, name)));
+/// For each of [`RAYS_PER_PRIM`] what is chosen, as a number in [`CHOICES`], and its time, building and tracing, over that of the best.
+fn regret(result: &SceneResult, blocks: &Blocks, model: &Model) -> Result<Vec<(usize, f64)>> {
+    let costs = CHOICES.map(|(name, _)| cost(result, name));
     let of = |rays_per_prim| {
         let options = BuildOptions { rays_per_prim, ..BuildOptions::default() };
         let built = model.with_scene(|scene| OwnedAccel::automatic(scene, &options))?;
-        let chosen = built.accel().info().kind;
-        let time = |[build, ray]: [f64; 2]| build + f64::from(rays_per_prim) * ray;
-        let best = time(bvh).min(time(grids[0])).min(time(grids[1]));
-        // A grid that is chosen is a uniform one.
-        Ok((chosen, time(if chosen == Chosen::Grid { grids[1] } else { bvh }) / best))
+        let is_it =
+            |(_, other): &&(&str, Rc<OwnedAccel>)| other.accel().block() == built.accel().block();
+        let name =
+            blocks.iter().find(is_it).context("what was chosen is not there to choose from")?.0;
+        let chosen = CHOICES.iter().position(|(other, _)| *other == name).context("no choice")?;
+        let times = costs.map(|[build, ray]| build + f64::from(rays_per_prim) * ray);
+        Ok((chosen, times[chosen] / times.into_iter().fold(f64::INFINITY, f64::min)))
     };
     RAYS_PER_PRIM.into_iter().map(of).collect()
 }
@@ -125,16 +138,36 @@ fn cost(result: &SceneResult, name: &str) -> [f64; 2] {
     [build, mean.exp()]
 }
 
-fn print_regrets(regrets: &[(String, Vec<(Chosen, f64)>)]) {
-    println!("REGRET of the choice, building and tracing; u: a uniform grid was chosen.\n");
+/// The costs of what there is to choose from.
+fn print_costs(results: &[SceneResult]) {
+    println!(
+        "COST: nanoseconds for each triangle to build, and for a ray, the mean of all kinds.\n"
+    );
+    print!("  {:<24}", "");
+    CHOICES.iter().for_each(|(name, _)| print!("{name:>14}"));
+    println!();
+    for result in results {
+        print!("  {:<24}", result.name);
+        for (name, _) in CHOICES {
+            let [build, ray] = cost(result, name).map(|seconds| 1e9 * seconds);
+            print!("{:>14}", format!("{build:.0}, {ray:.0}"));
+        }
+        println!();
+    }
+    println!();
+}
+
+fn print_regrets(regrets: &[(String, Vec<(usize, f64)>)]) {
+    println!(
+        "REGRET of the choice, building and tracing; f: a fast BVH was chosen, n: a nested grid, u: a uniform one.\n"
+    );
     print!("  {:<24}", "rays a primitive");
     RAYS_PER_PRIM.iter().for_each(|rays| print!("{rays:>9}"));
     println!();
     for (name, row) in regrets {
         print!("  {name:<24}");
         for (chosen, regret) in row {
-            let mark = if *chosen == Chosen::Grid { "u" } else { " " };
-            print!("{:>9}", format!("{regret:.2}{mark}"));
+            print!("{:>9}", format!("{regret:.2}{}", CHOICES[*chosen].1));
         }
         println!();
     }
@@ -144,7 +177,7 @@ fn print_regrets(regrets: &[(String, Vec<(Chosen, f64)>)]) {
 }
 
 /// 1,500 tubes of 24 sides, 1 to 6 hundredths thick and 0.4 to 4 long, a third of them askew: 72,000 triangles.
-fn tubes() -> RenderScene {
+pub fn tubes() -> RenderScene {
     const SIDES: u32 = 24;
     let mut random = Random::new(11);
     let mut mesh = TriangleMesh::default();
@@ -171,7 +204,7 @@ fn tubes() -> RenderScene {
 }
 
 /// 103 balls of 1,000 to 40,000 triangles on a floor, in sizes of 1 to 1/1000.
-fn sizes() -> RenderScene {
+pub fn sizes() -> RenderScene {
     let mut random = Random::new(12);
     let mut mesh = make::plane(20_000).placed(8.0, [-4.0, -4.0, 0.0]);
     for i in 0..103 {
@@ -199,13 +232,13 @@ mod tests {
         let options = Options::parse_from(words);
         let case = scenes::cases(&options).remove(0);
         let scene = case.load(&options).expect("a generated scene");
-        let lineup = lineup(&scene.model).expect("structures");
+        let (lineup, blocks) = lineup(&scene.model).expect("structures");
         let result = measure_lineup(&case.name, &scene, lineup, &options, &mut Watch::new());
         let result = result.expect("the same answers");
-        assert_eq!((result.structures.len(), result.subjects.len()), (4, 5));
-        let regrets = regret(&result, &scene.model).expect("a choice");
+        assert_eq!((result.structures.len(), result.subjects.len()), (5, 6));
+        let regrets = regret(&result, &blocks, &scene.model).expect("a choice");
         assert!(regrets.iter().all(|(_, regret)| *regret >= 1.0));
-        assert_eq!(regrets[RAYS_PER_PRIM.len() - 1].0, Chosen::Bvh);
+        assert_eq!(CHOICES[regrets[RAYS_PER_PRIM.len() - 1].0].0, "bvh");
     }
 
     #[test]

@@ -189,7 +189,7 @@ pub type RtProgress = Option<unsafe extern "C" fn(user: *mut c_void, done: f32) 
 #[repr(C)]
 pub struct RtBuildOptions {
     pub struct_size: u32,
-    /// One of `RT_QUALITY_`.
+    /// One of `RT_QUALITY_`. `rt_build` takes fast for balanced where rays are few.
     pub quality: u32,
     /// One of `RT_LAYOUT_`, for a BVH.
     pub layout: u32,
@@ -213,7 +213,8 @@ pub struct RtBuildOptions {
     pub grid_density: f32,
     /// How deep grids may be nested, the outermost counted, up to 8; 0: 8.
     pub grid_depth: u32,
-    /// For `rt_build`, how many rays for each primitive will be traced before the next build; not negative. 0: many.
+    /// For `rt_build`, how many rays for each primitive will be traced before the next build; not negative. 0: many. Below 6:
+    /// few.
     pub rays_per_prim: f32,
 }
 

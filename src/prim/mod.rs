@@ -21,7 +21,7 @@ pub(crate) use pack::{Packer, pack_in_order};
 pub(crate) use refit::refit_leaves;
 pub(crate) use shapes::{Shapes, Source};
 pub(crate) use validate::leaves_are_sound;
-pub(crate) use visit::{Visitor, for_each_counted, for_each_named_in, for_each_prim_in, visit};
+pub(crate) use visit::{Visitor, for_each_named_in, visit};
 pub(crate) use whole::BlockWriter;
 
 use crate::block::Block;

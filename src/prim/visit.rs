@@ -4,7 +4,6 @@ use core::ops::Range;
 
 use super::gather::{Shape, is_sound, sphere};
 use super::names::Names;
-use crate::block::Census;
 use crate::kinds::{INSTANCES, SPHERES};
 use crate::scene::Scene;
 use crate::simd::SMALL;
@@ -69,23 +68,6 @@ fn show<V: Visitor + ?Sized>(scene: &Scene, range: Range<u32>, visitor: &mut V) 
             }
         }
     }
-}
-
-/// Calls `f` with each primitive that can be hit: quickly if the census found none that cannot.
-#[inline]
-pub(crate) fn for_each_counted(scene: &Scene, census: &Census, f: impl FnMut(Prim)) {
-    for_each_prim_in(scene, 0..u32::MAX, census.ignored_count == 0, f);
-}
-
-/// Calls `f` with each primitive in `range` that can be hit; with `sound`, all of them can.
-#[inline]
-pub(crate) fn for_each_prim_in(
-    scene: &Scene,
-    range: Range<u32>,
-    sound: bool,
-    mut f: impl FnMut(Prim),
-) {
-    for_each_named_in(scene, range, sound, |prim, _| f(prim));
 }
 
 /// Calls `f` with each primitive in `range` that can be hit, and with what knows its vertices by name; with `sound`, all

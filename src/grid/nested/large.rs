@@ -4,7 +4,7 @@ use crate::block::Census;
 use crate::block::leaf::TRIANGLES_AT_LEAST;
 use crate::caller::Caller;
 use crate::math::{Aabb, wide};
-use crate::prim::{GRAIN, for_each_prim_in};
+use crate::prim::{GRAIN, Names, Shape, Visitor, box_around, visit};
 use crate::scene::Scene;
 use core::ops::Range;
 
@@ -36,6 +36,45 @@ fn rounded_length(aabb: &Aabb) -> f32 {
     x.max(y).max(z)
 }
 
+/// A search for them.
+struct Search {
+    found: Large,
+    /// What is no longer than this is none of them.
+    least: f64,
+    /// Whether all can be hit.
+    sound: bool,
+}
+
+impl Search {
+    #[inline(always)]
+    fn look_at(&mut self, id: u32, aabb: &Aabb) {
+        let is_short = f64::from(rounded_length(aabb)) * ROUNDED < self.least;
+        if is_short || length(aabb) <= self.least {
+            self.found.others.add(aabb);
+        } else {
+            self.found.insert(id, *aabb);
+            self.least = self.found.least().max(self.least);
+        }
+    }
+}
+
+impl Visitor for Search {
+    #[inline(always)]
+    fn triangle(&mut self, id: u32, corners: Option<[[f32; 3]; 3]>, _names: Names) {
+        let is_sound = |corners| self.sound || Shape::Triangle(corners).sound().is_some();
+        if let Some(corners) = corners.filter(|corners| is_sound(*corners)) {
+            self.look_at(id, &box_around(corners));
+        }
+    }
+
+    #[inline(always)]
+    fn other(&mut self, id: u32, shape: Shape) {
+        if let Some(shape) = shape.sound() {
+            self.look_at(id, &shape.aabb());
+        }
+    }
+}
+
 impl Large {
     const NONE: Self =
         Large { ids: [0; MOST], boxes: [Aabb::EMPTY; MOST], count: 0, others: Aabb::EMPTY };
@@ -50,18 +89,9 @@ impl Large {
         }
         let (limit, sound) = (census.prim_limit as usize, census.ignored_count == 0);
         let of_part = |ids: Range<usize>| {
-            let mut part = Large::NONE;
-            let ids = ids.start as u32..ids.end as u32;
-            for_each_prim_in(scene, ids, sound, |prim| {
-                let aabb = prim.shape.aabb();
-                let is_short = f64::from(rounded_length(&aabb)) * ROUNDED < least;
-                if is_short || length(&aabb) <= least {
-                    part.others.add(&aabb);
-                } else {
-                    part.insert(prim.id, aabb);
-                }
-            });
-            part
+            let mut part = Search { found: Large::NONE, least, sound };
+            visit(scene, ids.start as u32..ids.end as u32, &mut part);
+            part.found
         };
         caller.for_parts(limit, caller.part_size(limit, GRAIN), of_part, |part| {
             found.others.add(&part.others);
@@ -90,6 +120,11 @@ impl Large {
             self.ids[place..self.count].rotate_right(1);
             (self.boxes[place], self.ids[place]) = (aabb, id);
         }
+    }
+
+    /// What is no longer than this would not be kept.
+    fn least(&self) -> f64 {
+        if self.count == MOST { length(&self.boxes[MOST - 1]) } else { 0.0 }
     }
 
     /// The box around them.
