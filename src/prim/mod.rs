@@ -33,7 +33,7 @@ use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Single, Triangles};
-use crate::simd::{Kernel, SMALL, Simd};
+use crate::simd::{Kernel, SMALL, Simd, prefetch};
 
 /// The leaf blocks of one accel.
 #[derive(Clone, Copy)]
@@ -166,6 +166,12 @@ impl Leaves<'_> {
     ) -> bool {
         if SMALL {
             return one_by_one(block, number as u32, lanes, ray, query);
+        }
+        // What a closest hit is called is far away, and asked for last.
+        if Q::CAN_WAIT
+            && let Some(id) = self.prim_ids.get(block.first as usize)
+        {
+            prefetch(id);
         }
         Look { block, number, lanes, ray, query }.run(s)
     }
