@@ -61,8 +61,8 @@ impl Ray {
         let length = powers(s, fastest);
         let scales = Scales { t: length.mul(space), space, reach };
         let [t_scale, ..] = array::<S>(scales.t);
-        let [.., t_min] = array::<S>(o.mul(scales.t));
-        let [.., t_max] = array::<S>(d.mul(scales.t));
+        let [.., t_min] = array::<S>(o.mul(splat(t_scale)));
+        let [.., t_max] = array::<S>(d.mul(splat(t_scale)));
         let [t_min, t_max] = framed([t_min, t_max]);
         let slab = NarrowSlab::new(s, [o, d, inverse], &scales, t_min);
         let fastest = fastest.less_or_equal(speed);
@@ -236,6 +236,40 @@ fn array<S: Simd>(v: <S as Width<4>>::V) -> [f32; 4] {
 mod tests {
     use super::*;
     use crate::math::rounding::UNIT32;
+    use crate::simd::{Kernel, dispatch};
+    use std::format;
+    use std::string::String;
+
+    /// Prepares a ray by vectors.
+    struct ByVectors(Ray);
+
+    impl Kernel for ByVectors {
+        type Output = Option<PreparedRay>;
+
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            self.0.prepare_with(s, 3.0).map(|(ray, _)| ray)
+        }
+    }
+
+    /// What is said of a prepared ray, without the lanes that mean nothing.
+    fn said(ray: PreparedRay) -> String {
+        let three = |[x, y, z, _]: [f32; 4]| [x, y, z, 0.0];
+        let (origin, direction) = (three(ray.origin), three(ray.direction));
+        format!("{:?}", PreparedRay { origin, direction, ..ray })
+    }
+
+    #[test]
+    fn vectors_prepare_a_ray_as_the_longer_way_does() {
+        let limits =
+            [f32::NEG_INFINITY, f32::MIN, -7e9, -1.0, 0.0, 1e-4, 2.5, 7e9, f32::MAX, f32::INFINITY];
+        for (t_min, t_max) in limits.into_iter().flat_map(|a| limits.map(|b| (a, b))) {
+            for direction in [[1.0, 0.5, -0.25], [-3e-3, 1e-3, 2e-3], [5e8, -1.0, 5e8]] {
+                let ray = Ray::new([0.5, -2.0, 40.0], direction).with_limits(t_min, t_max);
+                let (long, short) = (ray.prepare_any(3.0), dispatch(ByVectors(ray)));
+                assert_eq!(short.map(said), long.map(said), "{ray:?}");
+            }
+        }
+    }
 
     #[test]
     fn rays_that_hit_nothing_are_not_prepared() {
