@@ -245,9 +245,7 @@ impl<Q: Query> Kernel for Look<'_, Q> {
         } else {
             sieve::triangles::<S, false>(s, ray, t_bound, block, lanes)
         };
-        if found.candidates == 0 {
-            return false;
-        }
+        let Some(found) = found else { return false };
         let number = number as u32;
         // Neither `t` nor order matters to those that want any hit.
         let inside = if Q::ORDERED { 0 } else { found.inside(s, ray) };

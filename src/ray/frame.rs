@@ -4,6 +4,7 @@ use super::exponents::rounded;
 use super::{Axis, Ray};
 use crate::exact::Line;
 use crate::math::rounding::{Round, UNIT32, f32_above};
+use crate::simd::{Lanes, Width};
 
 /// A ray that can hit something, with what every box and primitive test needs of it.
 ///
@@ -60,9 +61,7 @@ pub(crate) const TINY: f32 = 1.0 / (1u128 << 100) as f32;
 /// below the frame's least float.
 #[inline(always)]
 fn depth_slack(depth: f32) -> f32 {
-    // Infinite depths stay as they are.
-    let size = if depth.abs() < f32::MAX { depth.abs() } else { f32::MAX };
-    size * DEPTH_SLACK + TINY
+    depth.abs() * DEPTH_SLACK + TINY
 }
 
 pub(super) const DEPTH_SLACK: f32 = 4.0 * UNIT32;
@@ -157,9 +156,16 @@ impl PreparedRay {
     ///
     /// The frame's limits are less than an ulp or `TINY / 8` outside of the given ones, so twice the slack is enough.
     #[inline(always)]
-    pub fn inner_depths(&self) -> [f32; 2] {
-        let [low, high] = [self.t_min, self.t_max].map(|t| t * self.shear.depth_rate);
-        [low + 2.0 * depth_slack(low), high - 2.0 * depth_slack(high)]
+    pub fn inner_depths<S: Width<4>>(&self, s: S) -> [f32; 2] {
+        let limits = s.load(&[self.t_min, self.t_max, 0.0, 0.0]);
+        let depths = limits.mul(s.splat(self.shear.depth_rate));
+        // Less than infinite ones, of which nothing can be taken away.
+        let depths = depths.max(s.splat(-f32::MAX)).min(s.splat(f32::MAX));
+        let [slack, tiny] = [2.0 * DEPTH_SLACK, 2.0 * TINY];
+        let (slack, tiny) = (s.load(&[slack, -slack, 0.0, 0.0]), s.load(&[tiny, -tiny, 0.0, 0.0]));
+        let mut inner = [0.0; 4];
+        depths.add(depths.abs().mul(slack).add(tiny)).store(&mut inner);
+        [inner[0], inner[1]]
     }
 
     /// A float of the frame that is not below the given `t` plus its `error`, and not far above.

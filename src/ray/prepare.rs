@@ -40,9 +40,10 @@ impl Ray {
     #[inline(always)]
     pub(crate) fn set_out<S: Simd>(&self, s: S, reach: f32) -> Option<(LateRay<S>, NarrowSlab)> {
         let splat = |x: f32| Width::<4>::splat(s, x);
-        let given = Ray { t_min: self.least(), t_max: self.most(), ..*self };
-        let [from, along] = given.rows();
-        let (o, d) = (Width::<4>::load(s, &from), Width::<4>::load(s, &along));
+        let [from, along] = self.rows();
+        // Limits that are no floats become the largest ones. A NaN stays, wherever it is; what else is infinite is no ordinary ray.
+        let o = splat(-f32::MAX).max(Width::<4>::load(s, &from));
+        let d = splat(f32::MAX).min(Width::<4>::load(s, &along));
         let (distance, speed) = (o.abs(), d.abs());
         let fastest = s.largest_of_three(speed);
         let most = splat(ORDINARY);
@@ -52,7 +53,7 @@ impl Ray {
         // These comparisons refuse a NaN, which may have been lost above.
         let least = splat(1.0 / ORDINARY).less_or_equal(fastest.min(reach));
         let sound = distance.less(most) & speed.less(most) & reach.less(most) & least;
-        if !(sound & 7 == 7 && given.t_min <= given.t_max) {
+        if !(sound & 7 == 7 && o.less_or_equal(d) & 8 != 0) {
             return None;
         }
         // 2^-e with 2^e above all coordinates, and 2^l below the fastest component.
@@ -60,7 +61,9 @@ impl Ray {
         let length = powers(s, fastest);
         let scales = Scales { t: length.mul(space), space, reach };
         let [t_scale, ..] = array::<S>(scales.t);
-        let [t_min, t_max] = framed([given.t_min * t_scale, given.t_max * t_scale]);
+        let [.., t_min] = array::<S>(o.mul(splat(t_scale)));
+        let [.., t_max] = array::<S>(d.mul(splat(t_scale)));
+        let [t_min, t_max] = framed([t_min, t_max]);
         let slab = NarrowSlab::new(s, [o, d, inverse], &scales, t_min);
         let fastest = fastest.less_or_equal(speed);
         Some((LateRay { s, o, d, inverse, space, length, t_scale, t_min, t_max, fastest }, slab))
@@ -233,6 +236,40 @@ fn array<S: Simd>(v: <S as Width<4>>::V) -> [f32; 4] {
 mod tests {
     use super::*;
     use crate::math::rounding::UNIT32;
+    use crate::simd::{Kernel, dispatch};
+    use std::format;
+    use std::string::String;
+
+    /// Prepares a ray by vectors.
+    struct ByVectors(Ray);
+
+    impl Kernel for ByVectors {
+        type Output = Option<PreparedRay>;
+
+        fn run<S: Simd>(self, s: S) -> Self::Output {
+            self.0.prepare_with(s, 3.0).map(|(ray, _)| ray)
+        }
+    }
+
+    /// What is said of a prepared ray, without the lanes that mean nothing.
+    fn said(ray: PreparedRay) -> String {
+        let three = |[x, y, z, _]: [f32; 4]| [x, y, z, 0.0];
+        let (origin, direction) = (three(ray.origin), three(ray.direction));
+        format!("{:?}", PreparedRay { origin, direction, ..ray })
+    }
+
+    #[test]
+    fn vectors_prepare_a_ray_as_the_longer_way_does() {
+        let limits =
+            [f32::NEG_INFINITY, f32::MIN, -7e9, -1.0, 0.0, 1e-4, 2.5, 7e9, f32::MAX, f32::INFINITY];
+        for (t_min, t_max) in limits.into_iter().flat_map(|a| limits.map(|b| (a, b))) {
+            for direction in [[1.0, 0.5, -0.25], [-3e-3, 1e-3, 2e-3], [5e8, -1.0, 5e8]] {
+                let ray = Ray::new([0.5, -2.0, 40.0], direction).with_limits(t_min, t_max);
+                let (long, short) = (ray.prepare_any(3.0), dispatch(ByVectors(ray)));
+                assert_eq!(short.map(said), long.map(said), "{ray:?}");
+            }
+        }
+    }
 
     #[test]
     fn rays_that_hit_nothing_are_not_prepared() {

@@ -24,7 +24,7 @@ impl<V: Lanes<16>> Triangles<V> {
     /// The sure lanes whose real `t` surely is within the ray's limits.
     #[inline(always)]
     pub fn inside<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay) -> u32 {
-        let [low, high] = ray.inner_depths();
+        let [low, high] = ray.inner_depths(s);
         let window = self.middle.inner_window(Scalar, [[low], [high]]);
         self.sure & self.meetings.inside::<S, true, 16>(s, splat(s, window))
     }
@@ -73,7 +73,7 @@ impl Triangles<[f32; 16]> {
     }
 }
 
-/// The filter for the `lanes` of a block, all at once unless they are few for the backend.
+/// The filter for the `lanes` of a block, all at once unless they are few for the backend; `None` if nothing is left.
 ///
 /// With `FREE`, the lanes that are left are none that the ray meets, but else may be others on another
 /// backend; without, no operation is fused and every backend leaves the same ones.
@@ -86,27 +86,33 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     t_bound: f32,
     block: &TriangleBlock,
     lanes: u32,
-) -> Triangles<<S as Width<16>>::V> {
+) -> Option<Triangles<<S as Width<16>>::V>> {
     let middle = Middle::of_one(ray, &block.aabb);
-    let window = middle.window(Scalar, limits(ray, t_bound));
-    let lanes = if middle.is_beyond(Scalar, window) == 0 { lanes } else { 0 };
     if S::FEW > 0 && lanes.count_ones() <= S::FEW {
-        return few(ray, middle, window, block, lanes).loaded(s);
+        let found = few(ray, middle, t_bound, block, lanes);
+        return (found.candidates != 0).then(|| found.loaded(s));
     }
     let along = Along::new(s, ray, &block.vertices);
     let across = Across::new::<S, FREE, 16>(s, ray, &block.vertices, &along);
-    let from_middle = along.raw.sub(Width::<16>::splat(s, middle.raw));
     let [a, b, c] = &block.corners;
     let corners = [corner(s, &across, a), corner(s, &across, b), corner(s, &across, c)];
-    let depths = [s.corners(from_middle, a), s.corners(from_middle, b), s.corners(from_middle, c)];
     let size = across.size();
     let size = s.corners(size, a).max(s.corners(size, b)).max(s.corners(size, c));
     let error = AreaError::new(s, Width::<16>::splat(s, shared_error(ray, middle.deepest[0])));
     let areas = Areas::new::<FREE, 16>(&corners, error.of::<S, FREE, 16>(s, size));
+    // Most leaves that a ray comes to it passes by.
+    let lanes = lanes & !areas.outside(s);
+    if lanes == 0 {
+        return None;
+    }
+    let window = middle.window(Scalar, limits(ray, t_bound));
+    let lanes = if middle.is_beyond(Scalar, window) == 0 { lanes } else { 0 };
+    let from_middle = along.raw.sub(Width::<16>::splat(s, middle.raw));
+    let depths = [s.corners(from_middle, a), s.corners(from_middle, b), s.corners(from_middle, c)];
     let meetings = Meetings::new::<S, FREE, 16>(s, middle.half, &areas, depths);
-    let outside = areas.outside(s) | meetings.outside::<S, FREE, 16>(s, splat(s, window));
-    let candidates = lanes & !outside;
-    Triangles { candidates, sure: candidates & areas.sure(s), middle, meetings }
+    let candidates = lanes & !meetings.outside::<S, FREE, 16>(s, splat(s, window));
+    let sure = candidates & areas.sure(s);
+    (candidates != 0).then_some(Triangles { candidates, sure, middle, meetings })
 }
 
 /// The corners that `list` names out of the vertices of a block.
@@ -136,11 +142,15 @@ fn splat<S: Width<16>>(s: S, [[low], [high]]: [[f32; 1]; 2]) -> [S::V; 2] {
 fn few(
     ray: &PreparedRay,
     middle: Middle<[f32; 1]>,
-    window: [[f32; 1]; 2],
+    t_bound: f32,
     block: &TriangleBlock,
     lanes: u32,
 ) -> Triangles<[f32; 16]> {
     let mut found = Triangles { candidates: 0, sure: 0, middle, meetings: Meetings::NOWHERE };
+    let window = middle.window(Scalar, limits(ray, t_bound));
+    if middle.is_beyond(Scalar, window) != 0 {
+        return found;
+    }
     let mut rest = lanes;
     while rest != 0 {
         let lane = rest.trailing_zeros();
@@ -196,7 +206,7 @@ impl<'a> Single<'a> {
     /// Whether a sure lane surely is met within the ray's limits.
     #[inline(never)]
     pub fn is_inside(&self, left: &Left) -> bool {
-        let depths = self.ray.inner_depths().map(|depth| [depth]);
+        let depths = self.ray.inner_depths(Scalar).map(|depth| [depth]);
         let window = self.middle.inner_window(Scalar, depths);
         left.sure && left.meetings.inside::<_, false, 1>(Scalar, window) != 0
     }
@@ -324,7 +334,7 @@ pub(super) mod single {
         let One { areas, meetings } = One::new(ray, &middle, corners);
         let outside =
             meetings.outside::<_, false, 1>(Scalar, middle.window(Scalar, limits(ray, t_bound)));
-        let inner = middle.inner_window(Scalar, ray.inner_depths().map(|depth| [depth]));
+        let inner = middle.inner_window(Scalar, ray.inner_depths(Scalar).map(|depth| [depth]));
         let inside = meetings.inside::<_, false, 1>(Scalar, inner);
         let sure = areas.sure(Scalar) != 0;
         let ([total], [rise], [error]) = (meetings.total, meetings.rise, meetings.error);
