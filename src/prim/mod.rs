@@ -33,7 +33,7 @@ use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
 use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Single, Triangles};
-use crate::simd::{Kernel, SMALL, Simd, prefetch};
+use crate::simd::{Kernel, SMALL, Simd};
 
 /// The leaf blocks of one accel.
 #[derive(Clone, Copy)]
@@ -171,7 +171,7 @@ impl Leaves<'_> {
         if Q::CAN_WAIT
             && let Some(id) = self.prim_ids.get(block.first as usize)
         {
-            prefetch(id);
+            s.prefetch(id);
         }
         Look { block, number, lanes, ray, query }.run(s)
     }
