@@ -167,8 +167,8 @@ impl Leaves<'_> {
         if SMALL {
             return one_by_one(block, number as u32, lanes, ray, query);
         }
-        // What a closest hit is called is far away, and asked for last.
-        if Q::CAN_WAIT
+        // What a hit is called is far away, and asked for last.
+        if Q::ORDERED
             && let Some(id) = self.prim_ids.get(block.first as usize)
         {
             s.prefetch(id);

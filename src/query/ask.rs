@@ -90,7 +90,6 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
         let waits = self.waiting.first_mut().is_some_and(|w| w.takes(ray, place, part));
         if waits {
             self.t_bound = part.far;
-            self.filter.fetch(place);
         }
         waits
     }
@@ -103,7 +102,6 @@ impl<D: Decide, W: Watch, const MEMORY: usize> Query for Closest<'_, D, W, MEMOR
     #[inline(always)]
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
         self.settle(ray);
-        self.filter.fetch(lane.place);
         // What was offered once is not computed again.
         let known = match &self.best {
             Some(best) => {

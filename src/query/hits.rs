@@ -176,7 +176,6 @@ impl Query for NextHits<'_, '_> {
     }
 
     fn triangle(&mut self, ray: &PreparedRay, lane: &TriangleLane) -> bool {
-        self.filter.fetch(lane.place);
         if self.filter.sees(lane.place, true)
             && let Some(met) = Exact::triangle(ray, lane, &mut ())
         {

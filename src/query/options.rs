@@ -3,7 +3,6 @@
 use crate::block::leaf::Place;
 use crate::block::{Finished, Geometry};
 use crate::ray::NONE;
-use crate::simd::prefetch;
 
 /// Which of two sides of a surface a ray may meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -145,14 +144,6 @@ impl<'m> Filter<'m> {
     #[inline(never)]
     fn sees_prim(&self, prim: u32, skippable: bool) -> bool {
         !(skippable && prim == self.choice.skip) && (self.choice.mask == 0 || self.mask_sees(prim))
-    }
-
-    /// Has the number of the primitive stored there fetched: it is far away, and asked for last.
-    #[inline(always)]
-    pub fn fetch(&self, place: Place) {
-        if let Some(number) = self.prim_ids().get(place.entry as usize) {
-            prefetch(number);
-        }
     }
 
     /// Whether meetings with either side count.
