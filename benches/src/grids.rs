@@ -177,7 +177,7 @@ fn print_regrets(regrets: &[(String, Vec<(usize, f64)>)]) {
 }
 
 /// 1,500 tubes of 24 sides, 1 to 6 hundredths thick and 0.4 to 4 long, a third of them askew: 72,000 triangles.
-pub fn tubes() -> RenderScene {
+fn tubes() -> RenderScene {
     const SIDES: u32 = 24;
     let mut random = Random::new(11);
     let mut mesh = TriangleMesh::default();
@@ -204,7 +204,7 @@ pub fn tubes() -> RenderScene {
 }
 
 /// 103 balls of 1,000 to 40,000 triangles on a floor, in sizes of 1 to 1/1000.
-pub fn sizes() -> RenderScene {
+fn sizes() -> RenderScene {
     let mut random = Random::new(12);
     let mut mesh = make::plane(20_000).placed(8.0, [-4.0, -4.0, 0.0]);
     for i in 0..103 {
