@@ -21,4 +21,5 @@ pub mod shared_scenes;
 pub mod stats;
 pub mod stress;
 pub mod textbook;
+#[cfg(feature = "tools")]
 pub mod threads;

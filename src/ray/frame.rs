@@ -58,7 +58,7 @@ pub(crate) struct Shear {
 pub(crate) const TINY: f32 = 1.0 / (1u128 << 100) as f32;
 
 /// What depths that are computed from limits are widened by, for one rounding and for what the scaling of vertices took
-/// below the frame's least float.
+/// below the frame's least float. An infinite depth stays so, or becomes a NaN with it, beyond which nothing is.
 #[inline(always)]
 fn depth_slack(depth: f32) -> f32 {
     depth.abs() * DEPTH_SLACK + TINY
