@@ -136,8 +136,7 @@ impl Kernel for Sift<'_> {
         let [a, b, c] = &block.corners;
         for (k, column) in block.vertices.iter().enumerate() {
             let column = s.load(column);
-            let corners = [a, b, c].map(|list| s.corners(column, list));
-            let [x, y, z] = corners;
+            let [x, y, z] = Width::<16>::of_corners(s, column, [a, b, c]);
             x.min(y).min(z).store(&mut walls[k]);
             x.max(y).max(z).store(&mut walls[k + 3]);
         }

@@ -31,9 +31,9 @@ use crate::block::leaf::{
 use crate::kinds::{BALLS, SPHERES};
 use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
-use crate::ray::{PreparedRay, Slab, WideSlab};
+use crate::ray::{Late, PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Single, Triangles};
-use crate::simd::{Kernel, SMALL, Simd};
+use crate::simd::{Kernel, SMALL, Simd, Width};
 
 /// The leaf blocks of one accel.
 #[derive(Clone, Copy)]
@@ -68,26 +68,28 @@ impl Leaves<'_> {
             || (next != 0 && self.intersect_block(s, kind, number + 1, next, ray, query))
     }
 
-    /// Offers `query` what the ray meets in any block: the traversal of a plain list.
+    /// Offers `query` what the ray meets in any block: the traversal of a plain list. The ray is prepared when it comes to a
+    /// block, unless it is.
     #[inline(always)]
     pub fn intersect_all<S: Simd, Q: Query>(
         &self,
         s: S,
-        ray: &PreparedRay,
+        (late, prepared): (&impl Late, &mut Option<PreparedRay>),
         slab: &impl Slab,
         query: &mut Q,
     ) -> bool {
         for (number, block) in self.triangle_blocks.iter().enumerate() {
             query.watch().step();
-            let part = slab.part(block.aabb.corners(), query.t_bound());
-            if part.is_empty() {
+            if slab.part_by(s, &block.aabb, query.t_bound()).is_empty() {
                 continue;
             }
+            let ray = &*prepared.get_or_insert_with(|| late.prepare());
             if self.intersect_block(s, KIND_TRIANGLES, number, block.lanes(), ray, query) {
                 return true;
             }
         }
         for (number, block) in self.sphere_blocks.iter().enumerate().filter(|_| BALLS) {
+            let ray = &*prepared.get_or_insert_with(|| late.prepare());
             if self.intersect_block(s, KIND_SPHERES, number, block.lanes(), ray, query) {
                 return true;
             }
@@ -237,13 +239,26 @@ impl<Q: Query> Kernel for Look<'_, Q> {
 
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> bool {
+        // Triangles that share nothing fill a block's vertices before half of its lanes.
+        if S::IN_HALVES && self.lanes < 1 << 8 {
+            self.among::<S, 8>(s)
+        } else {
+            self.among::<S, 16>(s)
+        }
+    }
+}
+
+impl<Q: Query> Look<'_, Q> {
+    /// The look at the first `N` lanes.
+    #[inline(always)]
+    fn among<S: Simd + Width<N>, const N: usize>(self, s: S) -> bool {
         let Look { block, number, lanes, ray, query } = self;
         query.watch().block(lanes.count_ones());
         let t_bound = query.t_bound();
         let found = if Q::ANY_BOXES {
-            sieve::triangles::<S, true>(s, ray, t_bound, block, lanes)
+            sieve::triangles::<S, true, N>(s, ray, t_bound, block, lanes)
         } else {
-            sieve::triangles::<S, false>(s, ray, t_bound, block, lanes)
+            sieve::triangles::<S, false, N>(s, ray, t_bound, block, lanes)
         };
         let Some(found) = found else { return false };
         let number = number as u32;
@@ -276,7 +291,7 @@ struct Several<'a, Q> {
     block: &'a TriangleBlock,
     number: u32,
     t_bound: f32,
-    found: Triangles<[f32; 16]>,
+    found: Triangles<[f32; 16], 16>,
     ray: &'a PreparedRay,
     query: &'a mut Q,
 }

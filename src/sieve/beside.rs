@@ -80,7 +80,6 @@ pub(super) fn not_beside<S: Simd>(
 #[inline(always)]
 fn all_above<S: Simd>(s: S, block: &TriangleBlock, of_vertices: <S as Width<16>>::V) -> u32 {
     let [a, b, c] = &block.corners;
-    let [a, b, c] =
-        [s.corners(of_vertices, a), s.corners(of_vertices, b), s.corners(of_vertices, c)];
+    let [a, b, c] = Width::<16>::of_corners(s, of_vertices, [a, b, c]);
     Width::<16>::splat(s, 0.0).less(a.min(b).min(c))
 }

@@ -184,16 +184,20 @@ impl<V: Copy> Meetings<V> {
         }
     }
 
-    /// In memory.
+    /// In memory, with room for more lanes, in which nothing is met.
     #[inline(always)]
-    pub fn stored<const N: usize>(&self) -> Meetings<[f32; N]>
+    pub fn stored<const N: usize, const ROOM: usize>(&self) -> Meetings<[f32; ROOM]>
     where
         V: Lanes<N>,
     {
+        const { assert!(N <= ROOM) }
         let mut stored = Meetings::NOWHERE;
-        self.total.store(&mut stored.total);
-        self.rise.store(&mut stored.rise);
-        self.error.store(&mut stored.error);
+        let Meetings { total, rise, error } = &mut stored;
+        for (v, room) in [(self.total, total), (self.rise, rise), (self.error, error)] {
+            if let Some(lanes) = room.first_chunk_mut() {
+                v.store(lanes);
+            }
+        }
         stored
     }
 }

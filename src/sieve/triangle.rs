@@ -11,7 +11,7 @@ use crate::simd::{Lanes, NUMBERS, Scalar, Simd, Width};
 /// Conservative for every finite triangle and prepared ray: what is rejected is not met in real
 /// arithmetic, and `sure` and `inside` are only said of what is so. The bounds grow with the triangle's own size across
 /// the ray and with the depth of its block. `docs/METHODS.md` derives the constants.
-pub(crate) struct Triangles<V> {
+pub(crate) struct Triangles<V, const N: usize> {
     /// Lanes that the filter could not reject.
     pub candidates: u32,
     /// Those between whose edges the ray's line surely passes.
@@ -20,34 +20,35 @@ pub(crate) struct Triangles<V> {
     meetings: Meetings<V>,
 }
 
-impl<V: Lanes<16>> Triangles<V> {
+impl<V: Lanes<N>, const N: usize> Triangles<V, N> {
     /// The sure lanes whose real `t` surely is within the ray's limits.
     #[inline(always)]
-    pub fn inside<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay) -> u32 {
+    pub fn inside<S: Simd + Width<N, V = V>>(&self, s: S, ray: &PreparedRay) -> u32 {
         let [low, high] = ray.inner_depths(s);
         let window = self.middle.inner_window(Scalar, [[low], [high]]);
-        self.sure & self.meetings.inside::<S, true, 16>(s, splat(s, window))
+        self.sure & self.meetings.inside::<S, true, N>(s, splat::<S, N>(s, window))
     }
 
     /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
     #[inline(always)]
-    pub fn nearest<S: Simd + Width<16, V = V>>(&self, s: S, lanes: u32) -> u32 {
+    pub fn nearest<S: Simd + Width<N, V = V>>(&self, s: S, lanes: u32) -> u32 {
         // Above zero, as the order is that of bits.
-        let ahead = Width::<16>::splat(s, 2.0 * self.middle.half);
+        let ahead = Width::<N>::splat(s, 2.0 * self.middle.half);
         let depth = self.meetings.rise.div(self.meetings.total).add(ahead);
-        Width::<16>::nearest(s, lanes, depth, &NUMBERS).1
+        let numbers = NUMBERS.first_chunk().unwrap_or(&[0; N]);
+        Width::<N>::nearest(s, lanes, depth, numbers).1
     }
 
     /// The lanes whose meeting may come up to `t_bound`. Never fused, as this serves both precisions.
     #[inline(always)]
-    pub fn up_to<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
+    pub fn up_to<S: Simd + Width<N, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
         let window = self.middle.window(Scalar, limits(ray, t_bound));
-        !self.meetings.outside::<S, false, 16>(s, splat(s, window))
+        !self.meetings.outside::<S, false, N>(s, splat::<S, N>(s, window))
     }
 
     /// The part of the ray in which it meets the plane of a sure lane, by `t` of the frame.
     #[inline(always)]
-    pub fn part<S: Simd + Width<16, V = V>>(
+    pub fn part<S: Simd + Width<N, V = V>>(
         &self,
         s: S,
         ray: &PreparedRay,
@@ -56,37 +57,38 @@ impl<V: Lanes<16>> Triangles<V> {
         self.meetings.lane(s, lane).part(&self.middle, ray)
     }
 
-    /// In memory, for those whom registers cannot be lent to.
+    /// In memory, for those whom registers cannot be lent to: with room for all lanes of a block.
     #[inline(always)]
-    pub fn stored(&self) -> Triangles<[f32; 16]> {
+    pub fn stored(&self) -> Triangles<[f32; 16], 16> {
         let Triangles { candidates, sure, middle, meetings } = *self;
         Triangles { candidates, sure, middle, meetings: meetings.stored() }
     }
 }
 
-impl Triangles<[f32; 16]> {
+impl<const N: usize> Triangles<[f32; N], N> {
     /// Back in registers.
     #[inline(always)]
-    pub fn loaded<S: Simd>(&self, s: S) -> Triangles<<S as Width<16>>::V> {
+    pub fn loaded<S: Width<N>>(&self, s: S) -> Triangles<S::V, N> {
         let Triangles { candidates, sure, middle, ref meetings } = *self;
         Triangles { candidates, sure, middle, meetings: meetings.loaded(s) }
     }
 }
 
-/// The filter for the `lanes` of a block, all at once unless they are few for the backend; `None` if nothing is left.
+/// The filter for the `lanes` of a block, none from `N` on, all at once unless they are few for the backend; `None` if
+/// nothing is left.
 ///
 /// With `FREE`, the lanes that are left are none that the ray meets, but else may be others on another
 /// backend; without, no operation is fused and every backend leaves the same ones.
 ///
 /// Source: \[WBW13\] for the shear; the bounds are our own.
 #[inline(always)]
-pub(crate) fn triangles<S: Simd, const FREE: bool>(
+pub(crate) fn triangles<S: Simd + Width<N>, const FREE: bool, const N: usize>(
     s: S,
     ray: &PreparedRay,
     t_bound: f32,
     block: &TriangleBlock,
     lanes: u32,
-) -> Option<Triangles<<S as Width<16>>::V>> {
+) -> Option<Triangles<<S as Width<N>>::V, N>> {
     let middle = Middle::of_one(ray, &block.aabb);
     if S::FEW > 0 && lanes.count_ones() <= S::FEW {
         let found = few(ray, middle, t_bound, block, lanes);
@@ -95,11 +97,16 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     let along = Along::new(s, ray, &block.vertices);
     let across = Across::new::<S, FREE, 16>(s, ray, &block.vertices, &along);
     let [a, b, c] = &block.corners;
-    let corners = [corner(s, &across, a), corner(s, &across, b), corner(s, &across, c)];
+    let corners = [
+        corner::<S, N>(s, &across, a),
+        corner::<S, N>(s, &across, b),
+        corner::<S, N>(s, &across, c),
+    ];
     let size = across.size();
-    let size = s.corners(size, a).max(s.corners(size, b)).max(s.corners(size, c));
-    let error = AreaError::new(s, Width::<16>::splat(s, shared_error(ray, middle.deepest[0])));
-    let areas = Areas::new::<FREE, 16>(&corners, error.of::<S, FREE, 16>(s, size));
+    let [x, y, z] = Width::<N>::of_corners(s, size, [a, b, c]);
+    let size = x.max(y).max(z);
+    let error = AreaError::new(s, Width::<N>::splat(s, shared_error(ray, middle.deepest[0])));
+    let areas = Areas::new::<FREE, N>(&corners, error.of::<S, FREE, N>(s, size));
     // Most leaves that a ray comes to it passes by.
     let lanes = lanes & !areas.outside(s);
     if lanes == 0 {
@@ -108,21 +115,22 @@ pub(crate) fn triangles<S: Simd, const FREE: bool>(
     let window = middle.window(Scalar, limits(ray, t_bound));
     let lanes = if middle.is_beyond(Scalar, window) == 0 { lanes } else { 0 };
     let from_middle = along.raw.sub(Width::<16>::splat(s, middle.raw));
-    let depths = [s.corners(from_middle, a), s.corners(from_middle, b), s.corners(from_middle, c)];
-    let meetings = Meetings::new::<S, FREE, 16>(s, middle.half, &areas, depths);
-    let candidates = lanes & !meetings.outside::<S, FREE, 16>(s, splat(s, window));
+    let depths = Width::<N>::of_corners(s, from_middle, [a, b, c]);
+    let meetings = Meetings::new::<S, FREE, N>(s, middle.half, &areas, depths);
+    let candidates = lanes & !meetings.outside::<S, FREE, N>(s, splat::<S, N>(s, window));
     let sure = candidates & areas.sure(s);
     (candidates != 0).then_some(Triangles { candidates, sure, middle, meetings })
 }
 
 /// The corners that `list` names out of the vertices of a block.
 #[inline(always)]
-fn corner<S: Simd>(
+fn corner<S: Width<16> + Width<N>, const N: usize>(
     s: S,
     vertices: &Across<<S as Width<16>>::V>,
     list: &[u8; 8],
-) -> Across<<S as Width<16>>::V> {
-    Across { x: s.corners(vertices.x, list), y: s.corners(vertices.y, list) }
+) -> Across<<S as Width<N>>::V> {
+    let Across { x, y } = *vertices;
+    Across { x: Width::<N>::corners(s, x, list), y: Width::<N>::corners(s, y, list) }
 }
 
 /// Depths from the origin between which is all that is of interest.
@@ -133,19 +141,19 @@ fn limits(ray: &PreparedRay, t_bound: f32) -> [[f32; 1]; 2] {
 
 /// A window of one ray in all lanes.
 #[inline(always)]
-fn splat<S: Width<16>>(s: S, [[low], [high]]: [[f32; 1]; 2]) -> [S::V; 2] {
+fn splat<S: Width<N>, const N: usize>(s: S, [[low], [high]]: [[f32; 1]; 2]) -> [S::V; 2] {
     [s.splat(low), s.splat(high)]
 }
 
 /// The filter, lane by lane.
 #[inline(never)]
-fn few(
+fn few<const N: usize>(
     ray: &PreparedRay,
     middle: Middle<[f32; 1]>,
     t_bound: f32,
     block: &TriangleBlock,
     lanes: u32,
-) -> Triangles<[f32; 16]> {
+) -> Triangles<[f32; N], N> {
     let mut found = Triangles { candidates: 0, sure: 0, middle, meetings: Meetings::NOWHERE };
     let window = middle.window(Scalar, limits(ray, t_bound));
     if middle.is_beyond(Scalar, window) != 0 {
@@ -159,7 +167,7 @@ fn few(
         if (areas.outside(Scalar) | meetings.outside::<_, false, 1>(Scalar, window)) == 0 {
             found.candidates |= 1 << lane;
             found.sure |= areas.sure(Scalar) << lane;
-            found.meetings.set(lane as usize % 16, &meetings);
+            found.meetings.set(lane as usize % N, &meetings);
         }
     }
     found

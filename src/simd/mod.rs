@@ -107,6 +107,32 @@ pub(crate) trait Width<const N: usize>: Copy {
         self.load(&lanes)
     }
 
+    /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
+    /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
+    #[inline(always)]
+    fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<N>>::V
+    where
+        Self: Width<16>,
+    {
+        let mut lanes = [0.0; 16];
+        table.store(&mut lanes);
+        Width::<N>::load(self, &core::array::from_fn(|i| lanes[corner(list, i)]))
+    }
+
+    /// The same for three lists.
+    #[inline(always)]
+    fn of_corners(
+        self,
+        table: <Self as Width<16>>::V,
+        [a, b, c]: [&[u8; 8]; 3],
+    ) -> [<Self as Width<N>>::V; 3]
+    where
+        Self: Width<16>,
+    {
+        let (a, b) = (Width::<N>::corners(self, table, a), Width::<N>::corners(self, table, b));
+        [a, b, Width::<N>::corners(self, table, c)]
+    }
+
     /// One lane.
     #[inline(always)]
     fn lane(self, v: Self::V, lane: u32) -> f32 {
@@ -197,6 +223,10 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// So few lanes of 16 are faster one by one.
     const FEW: u32;
 
+    /// Whether eight lanes take less time than sixteen: where these are two vectors. What a search waits for is mostly one
+    /// instruction after another, and not how wide they are.
+    const IN_HALVES: bool = true;
+
     /// Whether batches trace rays together and keep several in flight: where vectors are fast enough to wait for memory. Elsewhere it
     /// would only be one more copy of the code.
     const FLIES: bool = false;
@@ -267,15 +297,6 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     #[inline(always)]
     fn floats(self, whole: [i32; 4]) -> <Self as Width<4>>::V {
         self.load(&whole.map(|lane| lane as f32))
-    }
-
-    /// Lane `i` of the result is the lane of `table` that `list` names for it: the numbers of even lanes in
-    /// the nibbles of the first four bytes, the lower nibble first, those of odd lanes in the others.
-    #[inline(always)]
-    fn corners(self, table: <Self as Width<16>>::V, list: &[u8; 8]) -> <Self as Width<16>>::V {
-        let mut lanes = [0.0; 16];
-        table.store(&mut lanes);
-        self.load(&core::array::from_fn::<f32, 16, _>(|i| lanes[corner(list, i)]))
     }
 
     /// Moves those entries whose `near` is not above `t_bound` to the front of both columns, in
@@ -385,7 +406,7 @@ pub(crate) fn prefetch<T>(what: &T) {
     native::prefetch(what);
 }
 
-/// The lane that `list` names for lane `i`: see [`Simd::corners`].
+/// The lane that `list` names for lane `i`: see [`Width::corners`].
 fn corner(list: &[u8; 8], i: usize) -> usize {
     let place = i % 2 * 8 + i / 2 % 8;
     usize::from(list[place / 2] >> (4 * (place % 2)) & 15)

@@ -36,8 +36,55 @@ struct Neon;
 struct F4(float32x4_t);
 
 width!(Neon 4 F4 vdupq_n_f32 vld1q_f32);
-doubled!(Neon 8 of 4 F4);
-doubled!(Neon 16 of 8 Two<F4>);
+doubled! {
+    Neon 8 of 4 F4,
+
+    #[inline(always)]
+    fn corners(self, table: Two<Two<F4>>, list: &[u8; 8]) -> Two<F4> {
+        // SAFETY: NEON is there.
+        unsafe { named::<0>(bytes(table), list) }
+    }
+}
+
+doubled! {
+    Neon 16 of 8 Two<F4>,
+
+    #[inline(always)]
+    fn corners(self, table: Two<Two<F4>>, list: &[u8; 8]) -> Two<Two<F4>> {
+        // SAFETY: NEON is there.
+        unsafe { Two(named::<0>(bytes(table), list), named::<2>(bytes(table), list)) }
+    }
+}
+
+/// Sixteen lanes as a table of bytes.
+///
+/// # Safety
+///
+/// The processor has NEON.
+#[inline(always)]
+unsafe fn bytes(Two(Two(a, b), Two(c, d)): Two<Two<F4>>) -> uint8x16x4_t {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (a, b) = (vreinterpretq_u8_f32(a.0), vreinterpretq_u8_f32(b.0));
+        uint8x16x4_t(a, b, vreinterpretq_u8_f32(c.0), vreinterpretq_u8_f32(d.0))
+    }
+}
+
+/// The lanes of `table` that `list` names for eight lanes, of which the first is `4 FIRST`.
+///
+/// # Safety
+///
+/// The processor has NEON.
+#[inline(always)]
+unsafe fn named<const FIRST: usize>(table: uint8x16x4_t, list: &[u8; 8]) -> Two<F4> {
+    // SAFETY: the caller's promise; a row of shifts has four lanes.
+    unsafe {
+        let all = vreinterpretq_u32_u64(vdupq_n_u64(u64::from_le_bytes(*list)));
+        let low = vshlq_u32(all, vld1q_s32(SHIFTS[FIRST].as_ptr()));
+        let high = vshlq_u32(all, vld1q_s32(SHIFTS[FIRST + 1].as_ptr()));
+        Two(pick(table, low), pick(table, high))
+    }
+}
 
 /// How far to the left the two words of a list, twice, are shifted for the numbers of lanes `4 i` to `4 i + 3`.
 const SHIFTS: [[i32; 4]; 4] =
@@ -64,28 +111,6 @@ impl Simd for Neon {
     const FEW: u32 = 3;
 
     doubles_one_by_one!();
-
-    #[inline(always)]
-    fn corners(self, table: Two<Two<F4>>, list: &[u8; 8]) -> Two<Two<F4>> {
-        let Two(Two(a, b), Two(c, d)) = table;
-        // SAFETY: NEON is there; the arrays have the lanes that are read.
-        unsafe {
-            let [a, b, c, d] = [
-                vreinterpretq_u8_f32(a.0),
-                vreinterpretq_u8_f32(b.0),
-                vreinterpretq_u8_f32(c.0),
-                vreinterpretq_u8_f32(d.0),
-            ];
-            let table = uint8x16x4_t(a, b, c, d);
-            let all = vreinterpretq_u32_u64(vdupq_n_u64(u64::from_le_bytes(*list)));
-            let first = vshlq_u32(all, vld1q_s32(SHIFTS[0].as_ptr()));
-            let second = vshlq_u32(all, vld1q_s32(SHIFTS[1].as_ptr()));
-            let third = vshlq_u32(all, vld1q_s32(SHIFTS[2].as_ptr()));
-            let fourth = vshlq_u32(all, vld1q_s32(SHIFTS[3].as_ptr()));
-            let low = Two(pick(table, first), pick(table, second));
-            Two(low, Two(pick(table, third), pick(table, fourth)))
-        }
-    }
 
     #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {

@@ -219,17 +219,18 @@ impl<const N: usize> Width<N> for Scalar {
     fn compress_words(self, mask: u32, words: &[u32; N], out: &mut [MaybeUninit<u32>; N]) {
         compress(words, mask, out);
     }
+
+    #[inline(always)]
+    fn corners(self, table: [f32; 16], list: &[u8; 8]) -> [f32; N] {
+        core::array::from_fn(|i| table[corner(list, i)])
+    }
 }
 
 impl Simd for Scalar {
     const FEW: u32 = 8;
+    const IN_HALVES: bool = false;
 
     doubles_one_by_one!();
-
-    #[inline(always)]
-    fn corners(self, table: [f32; 16], list: &[u8; 8]) -> [f32; 16] {
-        core::array::from_fn(|i| table[corner(list, i)])
-    }
 
     #[inline(never)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {

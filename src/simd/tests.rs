@@ -66,12 +66,19 @@ impl Kernel for Compare {
         same::<8, S>(s, &self.0);
         same::<16, S>(s, &self.0);
         let (table, list) = (&self.0.lanes[0], self.0.bits.to_le_bytes());
-        let picked = stored(s.corners(Width::<16>::load(s, table), &list));
-        let expected = Scalar.corners(*table, &list);
-        assert_eq!(picked.map(f32::to_bits), expected.map(f32::to_bits), "{table:x?} {list:x?}");
+        corners::<8, S>(s, table, &list);
+        corners::<16, S>(s, table, &list);
         assert_eq!(kept(s, &self.0), kept(Scalar, &self.0), "keep_up_to");
         masked(s, &self.0);
     }
+}
+
+/// What a list names for `N` lanes.
+#[inline(always)]
+fn corners<const N: usize, S: Width<16> + Width<N>>(s: S, table: &[f32; 16], list: &[u8; 8]) {
+    let picked = stored(Width::<N>::corners(s, Width::<16>::load(s, table), list));
+    let expected: [f32; N] = Width::<N>::corners(Scalar, *table, list);
+    assert_eq!(picked.map(f32::to_bits), expected.map(f32::to_bits), "{table:x?} {list:x?}");
 }
 
 /// What a mask says of sixteen lanes.

@@ -7,7 +7,7 @@ pub(crate) use questions::{AnyHit, ClosestHit, ClosestMet, LocateHit, MEMORY, ei
 pub(crate) use settle::{Firsts, Together};
 
 use crate::block::leaf::Place;
-use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
+use crate::block::{Block, Bundles, Finished, KIND_GRID, KIND_LIST};
 use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::kinds::{GRID, WIDE};
@@ -178,6 +178,9 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         Bundles::Four(bundles) if WIDE => {
             bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query)
         }
+        _ if block.header.kind == KIND_LIST => {
+            leaves.intersect_all(s, (late, prepared), slab, query)
+        }
         _ => {
             if prepared.is_none() {
                 *prepared = Some(late.prepare());
@@ -186,12 +189,11 @@ pub(crate) fn trace<S: Simd, Q: Query>(
             // A copy, which may be lent to what is out of line: the way through bundles keeps its own in registers.
             let slab = &{ *slab };
             match block.header.kind {
-                KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
                 KIND_GRID if GRID => {
                     let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
                     grid::walk(s, &Cells { grids, words, runs, leaves }, ray, slab, query)
                 }
-                _ => leaves.intersect_all(s, ray, slab, query),
+                _ => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
             }
         }
     }

@@ -217,7 +217,7 @@ impl<V: Lanes<16>> Reach<V> {
         let [a, b, c] = &block.corners;
         for k in 0..3 {
             let at = axes[k].at(Width::<16>::load(s, &block.vertices[k]));
-            let corners = [s.corners(at, a), s.corners(at, b), s.corners(at, c)];
+            let corners = Width::<16>::of_corners(s, at, [a, b, c]);
             first[k] = axes[k].first(corners[0].min(corners[1]).min(corners[2]));
             last[k] = axes[k].last(corners[0].max(corners[1]).max(corners[2]));
         }

@@ -36,6 +36,12 @@ width! {
     Avx2 8 F8 _mm256_set1_ps _mm256_loadu_ps
 
     #[inline(always)]
+    fn corners(self, table: Two<F8>, list: &[u8; 8]) -> F8 {
+        // SAFETY: the token proves AVX2.
+        unsafe { pick(table, numbers::<0>(list)) }
+    }
+
+    #[inline(always)]
     fn compress_words(self, mask: u32, words: &[u32; 8], out: &mut [MaybeUninit<u32>; 8]) {
         // SAFETY: the token proves AVX2; both arrays have eight words.
         unsafe {
@@ -60,6 +66,12 @@ width! {
 
 doubled! {
     Avx2 16 of 8 F8,
+
+    #[inline(always)]
+    fn corners(self, table: Two<F8>, list: &[u8; 8]) -> Two<F8> {
+        // SAFETY: the token proves AVX2.
+        unsafe { Two(pick(table, numbers::<0>(list)), pick(table, numbers::<16>(list))) }
+    }
 
     #[inline(always)]
     fn select(self, mask: u32, chosen: Two<F8>, other: Two<F8>) -> Two<F8> {
@@ -250,8 +262,20 @@ unsafe fn pick(table: Two<F8>, numbers: __m256i) -> F8 {
     }
 }
 
-/// How far the numbers of eight lanes, the first four bytes for even ones, are to be shifted.
-const SHIFTS: [i32; 8] = [0, 0, 4, 4, 8, 8, 12, 12];
+/// The numbers that a list names for eight lanes, in their lowest four bits; `SKIP` is 16 for the upper lanes, else zero.
+///
+/// # Safety
+///
+/// The processor has AVX2.
+#[inline(always)]
+pub(super) unsafe fn numbers<const SKIP: i32>(list: &[u8; 8]) -> __m256i {
+    const SHIFTS: [i32; 8] = [0, 0, 4, 4, 8, 8, 12, 12];
+    // SAFETY: the caller's promise; the array has eight words.
+    unsafe {
+        let shifts = _mm256_loadu_si256(SHIFTS.map(|shift| shift + SKIP).as_ptr().cast());
+        _mm256_srlv_epi32(_mm256_set1_epi64x(i64::from_le_bytes(*list)), shifts)
+    }
+}
 
 impl Simd for Avx2 {
     const FEW: u32 = 0;
@@ -281,18 +305,6 @@ impl Simd for Avx2 {
     fn twice(self, four: &[f64; 4]) -> D44 {
         // SAFETY: the token proves that the instructions exist.
         unsafe { D44::twice(four) }
-    }
-
-    #[inline(always)]
-    fn corners(self, table: Two<F8>, list: &[u8; 8]) -> Two<F8> {
-        // SAFETY: the token proves AVX2.
-        unsafe {
-            let all = _mm256_set1_epi64x(i64::from_le_bytes(*list));
-            let shifts = _mm256_loadu_si256(SHIFTS.as_ptr().cast());
-            let low = _mm256_srlv_epi32(all, shifts);
-            let high = _mm256_srlv_epi32(all, _mm256_add_epi32(shifts, _mm256_set1_epi32(16)));
-            Two(pick(table, low), pick(table, high))
-        }
     }
 
     #[inline(always)]

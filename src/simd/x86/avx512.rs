@@ -8,7 +8,7 @@
 use core::arch::x86_64::*;
 use core::mem::MaybeUninit;
 
-use super::avx2::F8;
+use super::avx2::{F8, numbers};
 use super::doubles::{D4, D8};
 use super::sort;
 use super::sse2::F4;
@@ -37,6 +37,15 @@ width! {
     Avx512 8 F8 _mm256_set1_ps _mm256_loadu_ps
 
     #[inline(always)]
+    fn corners(self, table: F16, list: &[u8; 8]) -> F8 {
+        // SAFETY: the token proves AVX-512 F and AVX2. A permutation looks at the four lowest bits only.
+        unsafe {
+            let numbers = _mm512_castsi256_si512(numbers::<0>(list));
+            F8(_mm512_castps512_ps256(_mm512_permutexvar_ps(numbers, table.0)))
+        }
+    }
+
+    #[inline(always)]
     fn sort(
         self,
         mask: u32,
@@ -61,6 +70,17 @@ width! {
 
 width! {
     Avx512 16 F16 _mm512_set1_ps _mm512_loadu_ps
+
+    #[inline(always)]
+    fn corners(self, table: F16, list: &[u8; 8]) -> F16 {
+        const SHIFTS: [i32; 16] = [0, 0, 4, 4, 8, 8, 12, 12, 16, 16, 20, 20, 24, 24, 28, 28];
+        // SAFETY: the token proves AVX-512 F. A permutation looks at the four lowest bits only.
+        unsafe {
+            let all = _mm512_set1_epi64(i64::from_le_bytes(*list));
+            let shifts = _mm512_loadu_si512(SHIFTS.as_ptr().cast());
+            F16(_mm512_permutexvar_ps(_mm512_srlv_epi32(all, shifts), table.0))
+        }
+    }
 
     #[inline(always)]
     fn select(self, mask: u32, chosen: F16, other: F16) -> F16 {
@@ -265,6 +285,7 @@ const NUMBERS: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15
 
 impl Simd for Avx512 {
     const FEW: u32 = 0;
+    const IN_HALVES: bool = false;
     const FLIES: bool = true;
 
     type Doubles = D8;
@@ -291,17 +312,6 @@ impl Simd for Avx512 {
     fn twice(self, four: &[f64; 4]) -> D8 {
         // SAFETY: the token proves that the instructions exist.
         unsafe { D8::twice(four) }
-    }
-
-    #[inline(always)]
-    fn corners(self, table: F16, list: &[u8; 8]) -> F16 {
-        const SHIFTS: [i32; 16] = [0, 0, 4, 4, 8, 8, 12, 12, 16, 16, 20, 20, 24, 24, 28, 28];
-        // SAFETY: the token proves AVX-512 F. A permutation looks at the four lowest bits only.
-        unsafe {
-            let all = _mm512_set1_epi64(i64::from_le_bytes(*list));
-            let shifts = _mm512_loadu_si512(SHIFTS.as_ptr().cast());
-            F16(_mm512_permutexvar_ps(_mm512_srlv_epi32(all, shifts), table.0))
-        }
     }
 
     #[inline(always)]
