@@ -9,6 +9,13 @@ use crate::math::float::cube_root;
 /// Cells for each primitive in the outermost grid, and in those within cells.
 const OUTER_DENSITY: f64 = 0.02;
 const INNER_DENSITY: f64 = 0.2;
+/// The latter where no more than a part of what is listed can be listed again: else the first of the cells would take all of the memory, and
+/// those after them would stay whole, however much they hold.
+const SCARCE_DENSITY: f64 = 1.0 / 220.0;
+const SCARCE: u64 = 4;
+/// How much coarser the outermost grid becomes along each axis at a time while it is too fine: less than by half, as half may leave an
+/// eighth of the cells for which there is room.
+const COARSER: f64 = 0.7;
 /// A cell with no more than this many primitives is not divided: by the rule it never pays below 49, and hardly ever below this.
 pub(super) const FULL: u32 = 96;
 /// The most cells along an axis of a grid within a cell.
@@ -22,29 +29,36 @@ const ENTRY: f64 = 4.0;
 /// The same of listing as many primitives again as a cell holds: for the memory, and for the time to build it.
 const TWICE: f64 = 12.0;
 
-/// The resolution of the outermost grid over `count` primitives, `coarser` times too coarse along each axis.
+/// The resolution of the outermost grid over `count` primitives, made coarser so many times.
 pub(super) fn outer(bounds: &Aabb, options: &GridOptions, count: u32, coarser: u32) -> [u32; 3] {
     let proportions = proportions(bounds);
     let cells = match options.kind {
         GridKind::Octree => [2.0; 3],
         _ => cubes(proportions, f64::from(count) * options.density().unwrap_or(OUTER_DENSITY)),
     };
+    let part = (0..coarser).fold(1.0, |part, _| part * COARSER);
     // A flat axis has one cell whatever is asked for.
-    cells.map(|n| ((n + 0.5) as u32 >> coarser).clamp(1, MOST_CELLS))
+    cells.map(|n| ((n * part + 0.5) as u32).clamp(1, MOST_CELLS))
 }
 
-/// The resolution of a grid in a cell with `count` primitives, `coarser` times too coarse along each axis; `None` when one
-/// cell would be all of it.
+/// Cells for each primitive in grids within cells that list `listed` numbers, when `left` more may be listed.
+pub(super) fn inner_density(listed: u64, left: u64) -> f64 {
+    if left < listed / SCARCE { SCARCE_DENSITY } else { INNER_DENSITY }
+}
+
+/// The resolution of a grid in a cell with `count` primitives, `density` cells for each, halved so many times along each axis; `None`
+/// when one cell would be all of it.
 pub(super) fn inner(
     space: &Space,
     cell: &Place,
     options: &GridOptions,
     count: u32,
+    density: f64,
     coarser: u32,
 ) -> Option<[u32; 3]> {
     let parts = match options.kind {
         GridKind::Octree => [2.0; 3],
-        _ => cubes(space.edges(cell), f64::from(count) * INNER_DENSITY),
+        _ => cubes(space.edges(cell), f64::from(count) * density),
     };
     let most = space.most_parts(cell);
     let resolution =

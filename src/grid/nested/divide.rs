@@ -19,6 +19,8 @@ pub(super) struct Divider<'s, 'a, 'p> {
     /// The outermost grid.
     pub space: Space,
     pub options: &'p GridOptions,
+    /// Cells for each primitive.
+    pub density: f64,
     /// Whether these are a part of those there are, and there may be more room than it has.
     pub is_part: bool,
     /// Whether cells in these are as deep as they may be.
@@ -81,8 +83,9 @@ impl Divider<'_, '_, '_> {
             return Some(None);
         }
         for coarser in 0..TRIES {
+            let Divider { space, options, density, .. } = self;
             let resolution =
-                cost::inner(&self.space, &cell.place, self.options, cell.count, coarser);
+                cost::inner(space, &cell.place, options, cell.count, *density, coarser);
             let Some(resolution) = resolution else { break };
             let space = self.space.within(cell.place, resolution);
             let (first, near) = (self.growing.words.end(), Near::new(&space));

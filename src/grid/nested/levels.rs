@@ -1,5 +1,6 @@
 //! The grids of one depth before those of the next: one after the other, or many at the same time.
 
+use super::cost;
 use super::divide::{Divider, least_growth};
 use super::growing::{Growing, Pieces};
 use super::lists::{Record, Room, Waiting};
@@ -14,6 +15,8 @@ pub(super) struct Levels<'r> {
     /// The outermost grid.
     pub space: Space,
     pub options: &'r GridOptions,
+    /// Cells for each primitive in the grids of the depth at hand.
+    pub density: f64,
     pub caller: &'r Caller<'r>,
     /// How many numbers cells may list, and how many they do, waiting ones too.
     pub most: u64,
@@ -68,6 +71,8 @@ impl<'r> Levels<'r> {
         for depth in 2..=self.options.most_depth() {
             room.turn();
             let is_last = depth == self.options.most_depth();
+            let left = self.most.saturating_sub(self.total);
+            self.density = cost::inner_density(room.list.len() as u64, left);
             let done = self.divide_together(room, is_last)?;
             self.divide_rest(room, done, is_last)?;
         }
@@ -99,12 +104,13 @@ impl<'r> Levels<'r> {
     where
         'r: 'p,
     {
-        let (space, options, finest) = (self.space, self.options, self.finest);
+        let Levels { space, options, density, finest, .. } = *self;
         let (most, total) = (u64::MAX / 2, START);
         Divider {
             source,
             space,
             options,
+            density,
             is_part: true,
             is_last,
             list,

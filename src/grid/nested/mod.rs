@@ -34,8 +34,8 @@ use crate::scene::Scene;
 /// long to find out which of these are near.
 const WORK: u64 = 32;
 
-/// How often a grid that is too fine is halved along each axis before it is given up.
-const TRIES: u32 = 10;
+/// How often a grid that is too fine is made coarser before it is given up: the finest is of one cell by then.
+const TRIES: u32 = 20;
 
 /// Bytes for each primitive that a build may use beyond what one cell takes.
 const SPARE: usize = 56;
