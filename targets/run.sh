@@ -57,26 +57,26 @@ cargo_for() {
     fi
 }
 
-# library TARGET FEATURES [PANICS]: where libraykern.a is, with these kinds of blocks. A program that could panic does not link, unless
-# PANICS is `freestanding`: microcontrollers are held to that.
+# library TARGET FEATURES [PANICS [PROFILE]]: where libraykern.a is, with these kinds of blocks. A program that could panic does not link,
+# unless PANICS is `freestanding`: microcontrollers are held to that.
 library() {
-    local panics=${3:-panic-free}
+    local panics=${3:-panic-free} profile=${4:-embedded}
     local folder=$work/lib
     local archive=$folder/$1-$panics-${2//,/-}.a
-    (cd .. && CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked -p raykern-c --profile embedded \
+    (cd .. && CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked -p raykern-c --profile "$profile" \
         --no-default-features --features "$panics${2:+,$2}" --target "$1" --crate-type staticlib) >&2
     # The next one, with other features, takes its place.
-    cp "$folder/$1/embedded/libraykern.a" "$archive"
+    cp "$folder/$1/$profile/libraykern.a" "$archive"
     echo "$archive"
 }
 
 # agree TARGET KIND FLAGS: where the crate `agree` is.
 agree() {
-    local folder=$work/agree flags=${3:-}
+    local folder=$work/lib flags=${3:-}
     # The flags are for the library as well, not for the last crate alone.
     RUSTFLAGS=${flags//,/ } CARGO_TARGET_DIR=$folder cargo_for rustc -q --locked --manifest-path agree/Cargo.toml \
-        --release --target "$1" --crate-type "$2" >&2
-    echo "$folder/$1/release"
+        --profile emulated --target "$1" --crate-type "$2" >&2
+    echo "$folder/$1/emulated"
 }
 
 # What is not a measurement must be what is committed.
@@ -246,7 +246,7 @@ user() { # Rust target, C compiler, emulator
     native "$image" >"$work/$name.txt" || { cat "$work/$name.txt" >&2; return 1; }
     same agree.txt "$work/$name.txt"
     # A block of the other byte order is refused; the others give the picture.
-    small=$(library "$1" "" freestanding)
+    small=$(library "$1" "" freestanding emulated)
     "$2" -O1 "${sse[@]}" -static -ffp-contract=off -I ../include -I board programs/picture.c board/host.c "$small" -o "$image"
     native "$image" >"$work/$name.txt"
     case $name in
