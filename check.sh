@@ -116,7 +116,8 @@ step_fuzz() (
     findings=$(mktemp -d)
     hunt() { # target, inputs
         "$CARGO_TARGET_DIR/x86_64-unknown-linux-gnu/release/$1" "-artifact_prefix=$findings/" "-runs=$2" \
-            -max_total_time=120 -max_len=2048 -len_control=0 -timeout=30 >"$findings/$1.log" 2>&1
+            -max_total_time=300 -max_len=2048 -len_control=0 -timeout=30 >"$findings/$1.log" 2>&1 &&
+            grep -aq "^Done $2 runs" "$findings/$1.log"
     }
     hunt mesh 4000 & mesh=$!
     hunt ray 1300 & ray=$!

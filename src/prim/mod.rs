@@ -31,7 +31,7 @@ use crate::block::leaf::{
 use crate::kinds::{BALLS, SPHERES};
 use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
-use crate::ray::{Late, PreparedRay, Slab, WideSlab};
+use crate::ray::{Late, PreparedRay, Slab, WideSlab, ready};
 use crate::sieve::{self, Single, Triangles};
 use crate::simd::{Kernel, SMALL, Simd, Width};
 
@@ -83,13 +83,13 @@ impl Leaves<'_> {
             if slab.part_by(s, &block.aabb, query.t_bound()).is_empty() {
                 continue;
             }
-            let ray = &*prepared.get_or_insert_with(|| late.prepare());
+            let Some(ray) = ready(late, prepared) else { return false };
             if self.intersect_block(s, KIND_TRIANGLES, number, block.lanes(), ray, query) {
                 return true;
             }
         }
         for (number, block) in self.sphere_blocks.iter().enumerate().filter(|_| BALLS) {
-            let ray = &*prepared.get_or_insert_with(|| late.prepare());
+            let Some(ray) = ready(late, prepared) else { return false };
             if self.intersect_block(s, KIND_SPHERES, number, block.lanes(), ray, query) {
                 return true;
             }
