@@ -4,7 +4,7 @@ use super::stack::{Columns, Stack};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::prim::Leaves;
 use crate::query::{Query, Watch};
-use crate::ray::{Late, PreparedRay, Slab, WideBoxes, ready};
+use crate::ray::{Late, PreparedRay, Slab, WideBoxes};
 use crate::simd::{Simd, Width};
 
 /// Where a ray stands on its way through a tree of bundles.
@@ -178,7 +178,7 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
     if prepared.is_none() && !walk.arrive::<S, Q, W>(s, bundles, leaves, boxes, query) {
         return false;
     }
-    let Some(ray) = ready(late, prepared) else { return false };
+    let ray = &*prepared.get_or_insert_with(|| late.prepare());
     loop {
         let t_bounds = Width::<W>::splat(s, walk.t_bound());
         while !walk.at().is_leaf() {

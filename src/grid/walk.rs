@@ -4,7 +4,7 @@ use super::way::{Entry, Listed, Outer, Way};
 use crate::block::cells::{Cell, GridHead, Run, cell};
 use crate::prim::Leaves;
 use crate::query::{Erased, Query, Watch};
-use crate::ray::{Early, PreparedRay, Slab, WideSlab};
+use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::simd::{SMALL, Scalar, Simd};
 
 /// The parts of a block that a walk reads.
@@ -53,7 +53,7 @@ pub(crate) fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut 
     let (leaves, slab) = (&cells.leaves, &WideSlab::new(ray));
     // Instances are not handed on by pointers.
     if SMALL || Q::OF_INDEX {
-        leaves.intersect_all(Scalar, (&Early, &mut Some(*ray)), slab, query)
+        leaves.intersect_all(Scalar, ray, slab, query)
     } else {
         all_of(leaves, ray, slab, Erased(query))
     }
@@ -62,7 +62,7 @@ pub(crate) fn from_afar<Q: Query>(cells: &Cells, ray: &PreparedRay, query: &mut 
 /// The same for queries of any type.
 #[inline(never)]
 fn all_of(leaves: &Leaves, ray: &PreparedRay, slab: &WideSlab, mut query: Erased<true>) -> bool {
-    leaves.intersect_all(Scalar, (&Early, &mut Some(*ray)), slab, &mut query)
+    leaves.intersect_all(Scalar, ray, slab, &mut query)
 }
 
 /// From cell to cell until the ray leaves the grid or the bound; true when `query` ended the search.

@@ -31,7 +31,7 @@ use crate::block::leaf::{
 use crate::kinds::{BALLS, SPHERES};
 use crate::math::{Aabb, Bits};
 use crate::query::{Query, SphereLane, TriangleLane, Watch};
-use crate::ray::{Late, PreparedRay, Slab, WideSlab, ready};
+use crate::ray::{PreparedRay, Slab, WideSlab};
 use crate::sieve::{self, Single, Triangles};
 use crate::simd::{Kernel, SMALL, Simd, Width};
 
@@ -68,13 +68,12 @@ impl Leaves<'_> {
             || (next != 0 && self.intersect_block(s, kind, number + 1, next, ray, query))
     }
 
-    /// Offers `query` what the ray meets in any block: the traversal of a plain list. The ray is prepared when it comes to a
-    /// block, unless it is.
+    /// Offers `query` what the ray meets in any block: the traversal of a plain list.
     #[inline(always)]
     pub fn intersect_all<S: Simd, Q: Query>(
         &self,
         s: S,
-        (late, prepared): (&impl Late, &mut Option<PreparedRay>),
+        ray: &PreparedRay,
         slab: &impl Slab,
         query: &mut Q,
     ) -> bool {
@@ -83,13 +82,11 @@ impl Leaves<'_> {
             if slab.part_by(s, &block.aabb, query.t_bound()).is_empty() {
                 continue;
             }
-            let Some(ray) = ready(late, prepared) else { return false };
             if self.intersect_block(s, KIND_TRIANGLES, number, block.lanes(), ray, query) {
                 return true;
             }
         }
         for (number, block) in self.sphere_blocks.iter().enumerate().filter(|_| BALLS) {
-            let Some(ray) = ready(late, prepared) else { return false };
             if self.intersect_block(s, KIND_SPHERES, number, block.lanes(), ray, query) {
                 return true;
             }

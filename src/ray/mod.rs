@@ -18,7 +18,7 @@ pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
 pub(crate) use frame::{PreparedRay, TINY};
 pub(crate) use packet::{GROUPS, RayPacket, Spread};
-pub(crate) use prepare::{Early, Late, ready};
+pub(crate) use prepare::{Early, Late};
 pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".

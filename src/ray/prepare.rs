@@ -214,18 +214,6 @@ impl<S: Simd> Late for LateRay<S> {
     }
 }
 
-/// The ray, which is prepared now unless it is; where code shall be small all are, before they set out.
-#[inline(always)]
-pub(crate) fn ready<'p>(
-    late: &impl Late,
-    prepared: &'p mut Option<PreparedRay>,
-) -> Option<&'p PreparedRay> {
-    if !SMALL && prepared.is_none() {
-        *prepared = Some(late.prepare());
-    }
-    prepared.as_ref()
-}
-
 /// Of a ray that is prepared already, who is not asked.
 pub(crate) struct Early;
 

@@ -7,13 +7,13 @@ pub(crate) use questions::{AnyHit, ClosestHit, ClosestMet, LocateHit, MEMORY, ei
 pub(crate) use settle::{Firsts, Together};
 
 use crate::block::leaf::Place;
-use crate::block::{Block, Bundles, Finished, KIND_GRID, KIND_LIST};
+use crate::block::{Block, Bundles, Finished, KIND_BVH, KIND_GRID};
 use crate::bvh;
 use crate::grid::{self, Cells};
 use crate::kinds::{GRID, WIDE};
 use crate::prim::Leaves;
 use crate::query::{Decide, Erased, Meets, Query, Watch, geometry_of};
-use crate::ray::{Early, FrameSlab, Hit, Late, NONE, PreparedRay, Ray, Slab, ready};
+use crate::ray::{Early, FrameSlab, Hit, Late, NONE, PreparedRay, Ray, Slab};
 use crate::simd::{self, Kernel, SMALL, Scalar, Simd};
 
 /// What is asked of a ray.
@@ -178,21 +178,20 @@ pub(crate) fn trace<S: Simd, Q: Query>(
         Bundles::Four(bundles) if WIDE => {
             bvh::traverse_wide(s, bundles, leaves, (late, prepared), slab, query)
         }
-        // Where code shall be small rays are prepared, and a list is one of the structures below.
-        _ if !SMALL && block.header.kind == KIND_LIST => {
-            leaves.intersect_all(s, (late, prepared), slab, query)
-        }
         _ => {
-            let Some(ray) = ready(late, prepared) else { return false };
+            if prepared.is_none() {
+                *prepared = Some(late.prepare());
+            }
+            let Some(ray) = prepared else { return false };
             // A copy, which may be lent to what is out of line: the way through bundles keeps its own in registers.
             let slab = &{ *slab };
             match block.header.kind {
+                KIND_BVH => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
                 KIND_GRID if GRID => {
                     let (Block { grids, words, runs, .. }, leaves) = (*block, *leaves);
                     grid::walk(s, &Cells { grids, words, runs, leaves }, ray, slab, query)
                 }
-                KIND_LIST => leaves.intersect_all(s, (&Early, &mut Some(*ray)), slab, query),
-                _ => bvh::traverse(s, block.nodes, leaves, ray, slab, query),
+                _ => leaves.intersect_all(s, ray, slab, query),
             }
         }
     }
