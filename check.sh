@@ -114,6 +114,7 @@ step_fuzz() (
     cd fuzz
     released build --release --config 'build.rustflags=["--cfg=raykern_portable"]'
     findings=$(mktemp -d)
+    # One that runs out of time ends without an error, but with fewer inputs.
     hunt() { # target, inputs
         "$CARGO_TARGET_DIR/x86_64-unknown-linux-gnu/release/$1" "-artifact_prefix=$findings/" "-runs=$2" \
             -max_total_time=300 -max_len=2048 -len_control=0 -timeout=30 >"$findings/$1.log" 2>&1 &&

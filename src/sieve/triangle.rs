@@ -29,23 +29,6 @@ impl<V: Lanes<N>, const N: usize> Triangles<V, N> {
         self.sure & self.meetings.inside::<S, true, N>(s, splat::<S, N>(s, window))
     }
 
-    /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
-    #[inline(always)]
-    pub fn nearest<S: Simd + Width<N, V = V>>(&self, s: S, lanes: u32) -> u32 {
-        // Above zero, as the order is that of bits.
-        let ahead = Width::<N>::splat(s, 2.0 * self.middle.half);
-        let depth = self.meetings.rise.div(self.meetings.total).add(ahead);
-        let numbers = NUMBERS.first_chunk().unwrap_or(&[0; N]);
-        Width::<N>::nearest(s, lanes, depth, numbers).1
-    }
-
-    /// The lanes whose meeting may come up to `t_bound`. Never fused, as this serves both precisions.
-    #[inline(always)]
-    pub fn up_to<S: Simd + Width<N, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
-        let window = self.middle.window(Scalar, limits(ray, t_bound));
-        !self.meetings.outside::<S, false, N>(s, splat::<S, N>(s, window))
-    }
-
     /// The part of the ray in which it meets the plane of a sure lane, by `t` of the frame.
     #[inline(always)]
     pub fn part<S: Simd + Width<N, V = V>>(
@@ -62,6 +45,24 @@ impl<V: Lanes<N>, const N: usize> Triangles<V, N> {
     pub fn stored(&self) -> Triangles<[f32; 16], 16> {
         let Triangles { candidates, sure, middle, meetings } = *self;
         Triangles { candidates, sure, middle, meetings: meetings.stored() }
+    }
+}
+
+impl<V: Lanes<16>> Triangles<V, 16> {
+    /// The lane of `lanes`, of which there is one at least, whose meeting comes first or nearly so.
+    #[inline(always)]
+    pub fn nearest<S: Simd + Width<16, V = V>>(&self, s: S, lanes: u32) -> u32 {
+        // Above zero, as the order is that of bits.
+        let ahead = Width::<16>::splat(s, 2.0 * self.middle.half);
+        let depth = self.meetings.rise.div(self.meetings.total).add(ahead);
+        Width::<16>::nearest(s, lanes, depth, &NUMBERS).1
+    }
+
+    /// The lanes whose meeting may come up to `t_bound`. Never fused, as this serves both precisions.
+    #[inline(always)]
+    pub fn up_to<S: Simd + Width<16, V = V>>(&self, s: S, ray: &PreparedRay, t_bound: f32) -> u32 {
+        let window = self.middle.window(Scalar, limits(ray, t_bound));
+        !self.meetings.outside::<S, false, 16>(s, splat::<S, 16>(s, window))
     }
 }
 

@@ -13,18 +13,24 @@ use crate::grid::sixteen::Sixteen;
 use crate::grid::space::Space;
 use crate::prim::Source;
 
+/// What the grids of one depth have in common.
+#[derive(Clone, Copy)]
+pub(super) struct Depth {
+    /// Cells for each primitive.
+    pub density: f64,
+    /// Whether cells in these are as deep as they may be.
+    pub is_last: bool,
+}
+
 /// Divides cells of one depth.
 pub(super) struct Divider<'s, 'a, 'p> {
     pub source: Source<'s, 'a>,
     /// The outermost grid.
     pub space: Space,
     pub options: &'p GridOptions,
-    /// Cells for each primitive.
-    pub density: f64,
+    pub depth: Depth,
     /// Whether these are a part of those there are, and there may be more room than it has.
     pub is_part: bool,
-    /// Whether cells in these are as deep as they may be.
-    pub is_last: bool,
     /// The lists of the cells.
     pub list: &'p [u32],
     pub growing: Growing<'p>,
@@ -83,9 +89,9 @@ impl Divider<'_, '_, '_> {
             return Some(None);
         }
         for coarser in 0..TRIES {
-            let Divider { space, options, density, .. } = self;
+            let Divider { space, options, depth, .. } = self;
             let resolution =
-                cost::inner(space, &cell.place, options, cell.count, *density, coarser);
+                cost::inner(space, &cell.place, options, cell.count, depth.density, coarser);
             let Some(resolution) = resolution else { break };
             let space = self.space.within(cell.place, resolution);
             let (first, near) = (self.growing.words.end(), Near::new(&space));
@@ -164,7 +170,7 @@ impl Divider<'_, '_, '_> {
 
     /// Gives each cell of a grid its list.
     fn fill(&mut self, space: &Space, near: &Near, first: usize) -> Option<()> {
-        let full = if self.is_last { u32::MAX } else { FULL };
+        let full = if self.depth.is_last { u32::MAX } else { FULL };
         let [_, listed_from, next_from, _] = self.growing.ends();
         let all = 0..cell_count(space.resolution) as usize;
         make_room(&mut self.growing, space, first, all, full)?;

@@ -50,7 +50,7 @@ pub(super) fn grow(
         let space = outermost.grow(&mut room, caller)?;
         attempt.done(0.3)?;
         let total = (large.ids().len() + room.growing.pairs.len()) as u64;
-        let levels = Levels { space, options, density: 0.0, caller, most, total, finest: 1.0 };
+        let levels = Levels { space, options, caller, most, total, finest: 1.0 };
         heads[1] = Some(space.head(first_word, levels.divide_all(&mut room)?));
     }
     let Growing { words, listed, pairs, .. } = &mut room.growing;

@@ -1,7 +1,7 @@
 //! The grids of one depth before those of the next: one after the other, or many at the same time.
 
 use super::cost;
-use super::divide::{Divider, least_growth};
+use super::divide::{Depth, Divider, least_growth};
 use super::growing::{Growing, Pieces};
 use super::lists::{Record, Room, Waiting};
 use crate::caller::{Caller, PARTS};
@@ -15,8 +15,6 @@ pub(super) struct Levels<'r> {
     /// The outermost grid.
     pub space: Space,
     pub options: &'r GridOptions,
-    /// Cells for each primitive in the grids of the depth at hand.
-    pub density: f64,
     pub caller: &'r Caller<'r>,
     /// How many numbers cells may list, and how many they do, waiting ones too.
     pub most: u64,
@@ -70,21 +68,23 @@ impl<'r> Levels<'r> {
     pub fn divide_all(mut self, room: &mut Room) -> Option<u32> {
         for depth in 2..=self.options.most_depth() {
             room.turn();
-            let is_last = depth == self.options.most_depth();
             let left = self.most.saturating_sub(self.total);
-            self.density = cost::inner_density(room.list.len() as u64, left);
-            let done = self.divide_together(room, is_last)?;
-            self.divide_rest(room, done, is_last)?;
+            let depth = Depth {
+                density: cost::inner_density(room.list.len() as u64, left),
+                is_last: depth == self.options.most_depth(),
+            };
+            let done = self.divide_together(room, depth)?;
+            self.divide_rest(room, done, depth)?;
         }
         room.turn();
         Some(self.finest as u32)
     }
 
     /// Divides cells one after the other, from cell `done` on.
-    fn divide_rest(&mut self, room: &mut Room, done: usize, is_last: bool) -> Option<()> {
+    fn divide_rest(&mut self, room: &mut Room, done: usize, depth: Depth) -> Option<()> {
         let Room { source, list, waiting, growing } = room;
         let waiting = waiting.all().get_mut(done..)?;
-        let mut divider = self.divider(*source, list.all(), growing.free(), is_last);
+        let mut divider = self.divider(*source, list.all(), growing.free(), depth);
         (divider.most, divider.total, divider.is_part) = (self.most, self.total, false);
         divider.divide_each(waiting)?;
         (self.total, self.finest) = (divider.total, divider.finest);
@@ -99,20 +99,19 @@ impl<'r> Levels<'r> {
         source: Source<'s, 'a>,
         list: &'p [u32],
         growing: Growing<'p>,
-        is_last: bool,
+        depth: Depth,
     ) -> Divider<'s, 'a, 'p>
     where
         'r: 'p,
     {
-        let Levels { space, options, density, finest, .. } = *self;
+        let Levels { space, options, finest, .. } = *self;
         let (most, total) = (u64::MAX / 2, START);
         Divider {
             source,
             space,
             options,
-            density,
+            depth,
             is_part: true,
-            is_last,
             list,
             growing,
             pair_count: 0,
@@ -127,13 +126,13 @@ impl<'r> Levels<'r> {
     ///
     /// A part of a round knows nothing of the others. If it had not enough room, or if there are more numbers with its than may be
     /// listed, its cells and all that follow are left, to be divided one by one.
-    fn divide_together(&mut self, room: &mut Room, is_last: bool) -> Option<usize> {
+    fn divide_together(&mut self, room: &mut Room, depth: Depth) -> Option<usize> {
         let (mut done, all) = (0, room.waiting.len());
         if self.caller.part_count() == 1 || room.list.len() < PART {
             return Some(0);
         }
         while done < all {
-            for outcome in self.divide_parts(room, done, is_last).into_iter().flatten() {
+            for outcome in self.divide_parts(room, done, depth).into_iter().flatten() {
                 let Outcome { pieces, cells, more, peak, largest, finest } = outcome;
                 let total = more.map(|more| self.total + more);
                 let tried = self.total + peak;
@@ -148,12 +147,7 @@ impl<'r> Levels<'r> {
     }
 
     /// Divides as many cells from cell `done` on as make a round.
-    fn divide_parts(
-        &self,
-        room: &mut Room,
-        done: usize,
-        is_last: bool,
-    ) -> [Option<Outcome>; PARTS] {
+    fn divide_parts(&self, room: &mut Room, done: usize, depth: Depth) -> [Option<Outcome>; PARTS] {
         let Room { source, list, waiting, growing } = room;
         let (mut waiting, mut free) = (&mut waiting.all()[done..], growing.free());
         let list = &*list.all();
@@ -171,7 +165,7 @@ impl<'r> Levels<'r> {
             let (own, others) = take(&mut waiting).split_at_mut(count);
             let to = first(others);
             let (growing, rest) = free.split((to - from) as u64, (end.max(to) - from) as u64);
-            let divider = self.divider(*source, list, growing, is_last);
+            let divider = self.divider(*source, list, growing, depth);
             *job = Some(Part { divider, waiting: own, done: None });
             (waiting, free, from) = (others, rest, to);
         }

@@ -272,7 +272,8 @@ pub(super) unsafe fn numbers<const SKIP: i32>(list: &[u8; 8]) -> __m256i {
     const SHIFTS: [i32; 8] = [0, 0, 4, 4, 8, 8, 12, 12];
     // SAFETY: the caller's promise; the array has eight words.
     unsafe {
-        let shifts = _mm256_loadu_si256(SHIFTS.map(|shift| shift + SKIP).as_ptr().cast());
+        let shifts = _mm256_loadu_si256(SHIFTS.as_ptr().cast());
+        let shifts = _mm256_add_epi32(shifts, _mm256_set1_epi32(SKIP));
         _mm256_srlv_epi32(_mm256_set1_epi64x(i64::from_le_bytes(*list)), shifts)
     }
 }
