@@ -170,8 +170,9 @@ impl<const W: usize> Decided<W> {
     fn set_leaf(&mut self, node: &BvhNode, grounds: &Grounds, shapes: &mut Shapes) -> Option<()> {
         let Grounds { ids, areas, price, .. } = *grounds;
         let (count, is_sphere) = Grown::of(node);
-        self.aabb = node.aabb();
-        self.cost = [LEAF * areas.of(&self.aabb) + price; W];
+        let aabb = node.aabb();
+        self.aabb = aabb;
+        self.cost = [LEAF * areas.of(&aabb) + price; W];
         self.lanes = 1;
         self.content.count = count;
         let alone = count > grounds.together;
@@ -194,10 +195,14 @@ impl<const W: usize> Decided<W> {
 /// The corners of a triangle.
 #[inline(always)]
 fn triangle(id: u32, shapes: &mut Shapes) -> Option<[[f32; 3]; 3]> {
-    shapes.corners(id).or_else(|| match shapes.get(id)? {
+    // Not by a closure, to which they would be handed on in memory.
+    if let Some(corners) = shapes.corners(id) {
+        return Some(corners);
+    }
+    match shapes.get(id)? {
         Shape::Triangle(corners) => Some(corners),
         Shape::Sphere { .. } | Shape::Box(_) => None,
-    })
+    }
 }
 
 fn join<const W: usize>(
