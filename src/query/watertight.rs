@@ -45,6 +45,8 @@ impl Decide for Watertight {
     const ANY_BOXES: bool = false;
     type Memory = ();
 
+    /// In line where room is no matter.
+    #[cfg_attr(target_pointer_width = "64", inline(always))]
     fn likely(
         ray: &PreparedRay,
         lane: &TriangleLane,

@@ -24,6 +24,9 @@ pub(crate) struct TriangleDetail {
 }
 
 /// What `f32` knows of a triangle that the filter does not reject.
+///
+/// In line where room is no matter: corners that are handed on in memory are written one by one and read in pairs, which is slow.
+#[cfg_attr(target_pointer_width = "64", inline(always))]
 pub(crate) fn detail(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> TriangleDetail {
     let rate = ray.shear.depth_rate;
     let (depth, t_error, front) = match plane(ray, corners) {
@@ -82,6 +85,7 @@ struct Plane {
 /// Far tighter than what the areas give for a ray that starts on a large triangle: the error grows with the
 /// distance to the first vertex instead of with the triangle. The computation is that of
 /// [`interval`](crate::interval) with another unit, and its bounds.
+#[cfg_attr(target_pointer_width = "64", inline(always))]
 fn plane(ray: &PreparedRay, corners: [[f32; 3]; 3]) -> Option<Plane> {
     let [a, b, c] = corners.map(|vertex| Vec3::from(vertex) * ray.scale);
     let (e1, e2) = (b - a, c - a);
