@@ -49,8 +49,12 @@ impl PlaneMeeting<f64> {
         let to_plane = a.sub(s.quad(origin));
         let (e1, e2) = (s.quad(b).sub(a), s.quad(c).sub(a));
         let (n, aside) = (turned_cross(e1, e2), turned_cross(to_plane, direction));
-        let products =
-            Quad::sums([direction.mul(n), to_plane.mul(n), e2.mul(aside), e1.mul(aside)]);
+        let products = Quad::turned_sums([
+            direction.turned().mul(n),
+            to_plane.turned().mul(n),
+            e2.turned().mul(aside),
+            e1.turned().mul(aside),
+        ]);
         let sizes = Quad::sums([direction.abs(), to_plane.abs(), e1.abs(), e2.abs()]);
         let [along, ..] = products.array();
         let [_, t, u, v] = products.div(products.first()).array();
@@ -69,15 +73,16 @@ fn error<D: Doubles>(t: D, along: D, [direction, to_plane, e1, e2]: [D; 4]) -> (
     let clear = along_error.times(1024.0).less(along.abs());
     // A hundredth for the divisor's own error, and the roundings of the quotient. What does not wait for `t` is divided
     // beside it.
-    let fixed = to_plane.mul(size).times(1.01).div(along.abs());
-    let by_t = along_error.times(1.01).div(along.abs());
-    (fixed.add(t.abs().mul(by_t)).add(t.abs().times(3.0 * UNIT)), clear)
+    let part = size.times(1.01).div(along.abs());
+    let reach = to_plane.add(t.abs().mul(direction));
+    (reach.mul(part).add(t.abs().times(3.0 * UNIT)), clear)
 }
 
-/// `a x b`, by the operations of [`cross`].
+/// `a x b`, [turned](Quad::turned), by the operations of [`cross`]: to turn it back would take longer than to turn what it meets.
 #[inline(always)]
 fn turned_cross<Q: Quad>(a: Q, b: Q) -> Q {
-    a.mul(b.turned()).sub(a.turned().mul(b)).turned()
+    let (back_a, back_b) = (a.turned_back(), b.turned_back());
+    back_a.mul(b).sub(back_b.mul(a))
 }
 
 // On a processor of 32 bits each operation is a call, or many instructions: there these are calls as well.

@@ -9,21 +9,23 @@ use crate::ray::{Interval, PreparedRay};
 ///
 /// Most rays that hit anything compute one `t` so, and no node waits for it.
 pub(super) struct Waiting {
-    /// Where it is stored; [`NOWHERE`] if nothing waits.
-    place: Place,
+    /// The number of its block, [`NOWHERE`] if nothing waits, and its lane there. By themselves: what is written by parts is
+    /// slow to read as a whole, as a [`Place`] would be.
+    block: u32,
+    lane: u32,
     /// What is met before this `t` of the frame comes before all that was met so far.
     first_before: f32,
 }
 
 /// No block has this number.
-const NOWHERE: Place = Place { block: u32::MAX, lane: 0, entry: 0 };
+const NOWHERE: u32 = u32::MAX;
 
 impl Waiting {
     /// Nothing, and nothing ever if the filter asks more of a triangle than that it is met.
     #[inline(always)]
     pub fn new(filter: &Filter, t_max: f32) -> Self {
         let first_before = if filter.sees_all() { t_max } else { f32::NEG_INFINITY };
-        Waiting { place: NOWHERE, first_before }
+        Waiting { block: NOWHERE, lane: 0, first_before }
     }
 
     /// Takes the triangle that is stored there, which the ray surely meets in this part of itself, if that comes first and is within the
@@ -35,7 +37,7 @@ impl Waiting {
     pub fn takes(&mut self, ray: &PreparedRay, place: Place, part: Interval<f32>) -> bool {
         let first = ray.t_min < part.near && part.far < self.first_before;
         if first {
-            *self = Waiting { place, first_before: part.near };
+            *self = Waiting { block: place.block, lane: place.lane, first_before: part.near };
         }
         first
     }
@@ -46,11 +48,11 @@ impl Waiting {
         &self,
         blocks: impl FnOnce() -> &'m [TriangleBlock],
     ) -> Option<TriangleLane<'m>> {
-        let place = self.place;
-        if place.block == NOWHERE.block {
+        if self.block == NOWHERE {
             return None;
         }
-        let block = blocks().get(place.block as usize)?;
+        let block = blocks().get(self.block as usize)?;
+        let place = Place::of_lane(self.block, block.first, self.lane);
         Some(TriangleLane { block, place, sure: true, inside: true })
     }
 
@@ -61,7 +63,7 @@ impl Waiting {
         blocks: impl FnOnce() -> &'m [TriangleBlock],
     ) -> Option<TriangleLane<'m>> {
         let lane = self.lane(blocks);
-        (self.place, self.first_before) = (NOWHERE, f32::NEG_INFINITY);
+        (self.block, self.first_before) = (NOWHERE, f32::NEG_INFINITY);
         lane
     }
 }

@@ -2,7 +2,7 @@
 
 /// An axis: what is indexed by one needs no check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(usize)]
+#[repr(u32)]
 pub(crate) enum Axis {
     X = 0,
     Y = 1,

@@ -21,6 +21,12 @@ pub(super) fn scale_below(x: f32) -> f32 {
     f32::from_bits((253 << 23) - (x.to_bits() & EXPONENT))
 }
 
+/// The same in each lane.
+#[inline(always)]
+pub(super) fn scales_below<S: Simd>(s: S, v: <S as Width<4>>::V) -> <S as Width<4>>::V {
+    by_bits(s, v, |bits| (253u32 << 23).wrapping_sub(bits & EXPONENT))
+}
+
 /// In each lane the power of two that an ordinary number is not below, and below twice of.
 #[inline(always)]
 pub(super) fn powers<S: Simd>(s: S, v: <S as Width<4>>::V) -> <S as Width<4>>::V {

@@ -13,42 +13,44 @@ use crate::simd::{Lanes, Width};
 /// 1 and 2. Scaling by powers of two is exact but for what falls below 2^-149, far below everything
 /// that the tests grant. So one set of bounds holds for scenes of 1e-44 and of 1e38 and for directions
 /// of any length. `t` counts in lengths of the scaled direction there: `t * t_scale`.
+///
+/// In C's order, with what leaves read one by one within the last 64 bytes: of a number that lies further in front compilers
+/// read a whole vector, which waits for all that was written there by parts.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(crate) struct PreparedRay {
     /// The ray as it was given.
     pub given: Ray,
-    /// From given coordinates to the frame's: a power of two between 2^-126 and 2^126.
-    pub scale: f32,
     /// The fourth lane of these two means nothing: four are one vector on most machines.
     pub origin: [f32; 4],
     pub direction: [f32; 4],
     /// From given `t` to the frame's, a power of two.
     pub t_scale: f64,
+    pub shear: Shear,
+    /// From given coordinates to the frame's: a power of two between 2^-126 and 2^126.
+    pub scale: f32,
     /// Below all `t` of interest, in the frame.
     pub t_min: f32,
     /// Above all `t` of interest, in the frame: the given limit, or the largest float.
     pub t_max: f32,
-    pub shear: Shear,
 }
 
 /// What the triangle test needs: the axis along which the ray moves most becomes the depth, and the
 /// others are sheared so that the ray runs along it.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(crate) struct Shear {
     /// The axes x, y and depth of the sheared space, an even permutation.
     pub axes: [Axis; 3],
-    /// The direction's x and y for each unit of depth: at most 1 in size, but for rounding.
-    pub slope: [f32; 2],
-    /// What x and y of a sheared vertex may be off for each unit of depth, whatever they are.
-    pub blur: f32,
+    /// What each unit of depth takes: see [`slope`](Self::slope), [`pace`](Self::pace) and [`blur`](Self::blur). Side by side,
+    /// as what is written by parts is slow to read in pairs.
+    per_depth: [f32; 4],
     /// From given coordinates along that axis to depths, which grow along the ray: the frame's scale or minus that.
     pub depth_scale: f32,
     /// The depth of the ray's origin.
     pub origin_depth: f32,
     /// Depth from there for each unit of `t` in the frame, between 1 and 2.
     pub depth_rate: f32,
-    /// `t` for each unit of depth: the reciprocal of `depth_rate`.
-    pub pace: f32,
     /// Below the depth of all `t` of interest, from the origin.
     pub low: f32,
 }
@@ -70,6 +72,25 @@ pub(super) const DEPTH_SLACK: f32 = 4.0 * UNIT32;
 pub(super) const BLUR: f32 = 5.5 * UNIT32;
 
 impl Shear {
+    /// The direction's x and y for each unit of depth: at most 1 in size, but for rounding.
+    #[inline(always)]
+    pub fn slope(&self) -> [f32; 2] {
+        let [x, y, ..] = self.per_depth;
+        [x, y]
+    }
+
+    /// `t` for each unit of depth: the reciprocal of `depth_rate`.
+    #[inline(always)]
+    pub fn pace(&self) -> f32 {
+        self.per_depth[2]
+    }
+
+    /// What x and y of a sheared vertex may be off for each unit of depth, whatever they are.
+    #[inline(always)]
+    pub fn blur(&self) -> f32 {
+        self.per_depth[3]
+    }
+
     /// Above the depth of all `t` up to `t_bound`, from the origin.
     #[inline(always)]
     pub fn high(&self, t_bound: f32) -> f32 {
@@ -78,7 +99,7 @@ impl Shear {
     }
 }
 
-/// A component below this part of the largest moves the ray by less than what boxes are padded by: it counts
+/// A component of the scaled direction below this moves the ray by less than what boxes are padded by: it counts
 /// as this much, so that its reciprocal is finite.
 pub(super) const SLOWEST: f32 = 1.0 / (1u64 << 62) as f32;
 
@@ -86,8 +107,8 @@ impl Shear {
     /// For numbers of a prepared ray. `pace` is the reciprocal of the direction's size along `depth`.
     #[inline(always)]
     pub fn new(
-        depth: Axis,
-        pace: f32,
+        s: impl Width<4>,
+        (depth, pace): (Axis, f32),
         origin: &[f32; 4],
         direction: &[f32; 4],
         scale: f32,
@@ -96,19 +117,19 @@ impl Shear {
         let axes = depth.as_depth();
         let [kx, ky, depth] = axes.map(|axis| axis as usize);
         let depth_rate = direction[depth].abs();
-        let slope = [direction[kx] * pace, direction[ky] * pace];
-        let [a, b] = [slope[0].abs(), slope[1].abs()];
+        let (x, y) = (direction[kx] * pace, direction[ky] * pace);
+        let [a, b] = [x.abs(), y.abs()];
+        let mut per_depth = [0.0; 4];
+        s.load(&[x, y, pace, BLUR * if a > b { a } else { b }]).store(&mut per_depth);
         let sign = direction[depth].to_bits() & 1 << 31;
         let signed = |x: f32| f32::from_bits(x.to_bits() ^ sign);
         let low = t_min * depth_rate;
         Shear {
             axes,
-            slope,
-            blur: BLUR * if a > b { a } else { b },
+            per_depth,
             depth_scale: signed(scale),
             origin_depth: signed(origin[depth]),
             depth_rate,
-            pace,
             low: low - depth_slack(low),
         }
     }
@@ -126,12 +147,10 @@ impl PreparedRay {
         t_max: 0.0,
         shear: Shear {
             axes: [Axis::X, Axis::Y, Axis::Z],
-            slope: [0.0; 2],
-            blur: 0.0,
+            per_depth: [0.0; 4],
             depth_scale: 0.0,
             origin_depth: 0.0,
             depth_rate: 0.0,
-            pace: 0.0,
             low: 0.0,
         },
     };

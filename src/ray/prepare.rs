@@ -1,7 +1,7 @@
 //! From a ray as it is given to one that is prepared, in two steps: boxes can be tested before primitives.
 
 use super::exponents::{
-    EXPONENT, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded,
+    EXPONENT, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded, scales_below,
 };
 use super::frame::{PreparedRay, SLOWEST, Shear, TINY};
 use super::slab::{NarrowSlab, Scales};
@@ -34,21 +34,22 @@ impl Ray {
     /// definition, and for those at the ends of the floats. `reach` is the largest coordinate of the scene,
     /// infinite if it is not representable.
     ///
-    /// What all rays wait for is the way from the largest component over the reciprocals to the first boxes; so
-    /// division does not wait for the frame, and both meet behind it. All is done in vectors, also what is one number, and
+    /// What all rays wait for is the way over the reciprocals to the first boxes; so division waits for nothing, the frame is
+    /// found meanwhile, and both meet behind it. All is done in vectors, also what is one number, and
     /// all doubts are one question: every ray comes here, and many only to find that it hits nothing.
     #[inline(always)]
     pub(crate) fn set_out<S: Simd>(&self, s: S, reach: f32) -> Option<(LateRay<S>, NarrowSlab)> {
         let splat = |x: f32| Width::<4>::splat(s, x);
         let [from, along] = self.rows();
+        // Not the reciprocal of a limit, which may be a subnormal number: that takes some processors very long.
+        let speed = s.three(Width::<4>::load(s, &along).abs());
+        let inverse = splat(1.0).div(speed);
         // Limits that are no floats become the largest ones. A NaN stays, wherever it is; what else is infinite is no ordinary ray.
         let o = splat(-f32::MAX).max(Width::<4>::load(s, &from));
         let d = splat(f32::MAX).min(Width::<4>::load(s, &along));
-        let (distance, speed) = (o.abs(), d.abs());
+        let distance = o.abs();
         let fastest = s.largest_of_three(speed);
         let most = splat(ORDINARY);
-        // Not the reciprocal of a limit, which may be a subnormal number: that takes some processors very long.
-        let inverse = splat(1.0).div(speed.min(most).max(fastest.mul(splat(SLOWEST))));
         let reach = s.largest_of_three(distance).max(splat(reach));
         // These comparisons refuse a NaN, which may have been lost above.
         let least = splat(1.0 / ORDINARY).less_or_equal(fastest.min(reach));
@@ -57,8 +58,9 @@ impl Ray {
             return None;
         }
         // 2^-e with 2^e above all coordinates, and 2^l below the fastest component.
-        let space = reciprocals(s, powers(s, reach)).mul(splat(0.5));
+        let space = scales_below(s, reach);
         let length = powers(s, fastest);
+        let inverse = inverse.min(reciprocals(s, length).mul(splat(1.0 / SLOWEST)));
         let scales = Scales { t: length.mul(space), space, reach };
         let [t_scale, ..] = array::<S>(scales.t);
         let [.., t_min] = array::<S>(o.mul(splat(t_scale)));
@@ -138,7 +140,7 @@ impl Ray {
             t_scale: power_of_two(t_exponent),
             t_min: below,
             t_max: above,
-            shear: Shear::new(depth, pace, &origin, &direction, scale, below),
+            shear: Shear::new(Scalar, (depth, pace), &origin, &direction, scale, below),
         })
     }
 }
@@ -209,7 +211,7 @@ impl<S: Simd> Late for LateRay<S> {
             t_scale: self.t_scale(),
             t_min,
             t_max,
-            shear: Shear::new(depth, pace, &origin, &direction, scale, t_min),
+            shear: Shear::new(s, (depth, pace), &origin, &direction, scale, t_min),
         }
     }
 }
@@ -335,7 +337,7 @@ mod tests {
                 (axes, sign),
                 "{direction:?}"
             );
-            assert!(shear.blur <= 6.0 * UNIT32 && (1.0..2.0).contains(&shear.depth_rate));
+            assert!(shear.blur() <= 6.0 * UNIT32 && (1.0..2.0).contains(&shear.depth_rate));
         }
     }
 }

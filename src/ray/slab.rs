@@ -166,13 +166,13 @@ fn walls<S: Width<N>, const N: usize>(
     [origin, direction, inverse]: [S::V; 3],
     Scales { t, space, reach }: &Scales<S::V>,
 ) -> [S::V; 3] {
-    // What can be computed before the reciprocals are there, which takes the longest.
-    let behind = s.splat(0.0).sub(origin.mul(*t)).flipped_by(direction);
-    let negligible = reach.mul(*t).mul(s.splat(NEGLIGIBLE));
-    let pad = behind.abs().mul(s.splat(RELATIVE_PAD)).add(negligible);
+    // What can be computed before the reciprocals and the frame are there, which takes the longest.
+    let behind = s.splat(0.0).sub(origin).flipped_by(direction);
+    let pad = origin.abs().mul(s.splat(RELATIVE_PAD)).add(reach.mul(s.splat(NEGLIGIBLE)));
     let constant = reach.mul(*space).mul(s.splat(CONSTANT_PAD));
+    let inverse = inverse.mul(*t);
     [
-        inverse.mul(*t).with_sign_of(direction),
+        inverse.with_sign_of(direction),
         inverse.mul(behind.sub(pad)).sub(constant),
         inverse.mul(behind.add(pad)).add(constant),
     ]
@@ -254,15 +254,14 @@ impl FrameSlab {
     #[inline(never)]
     pub fn new(ray: &PreparedRay, reach: f32) -> Self {
         let PreparedRay { given, scale, origin, direction, t_min, .. } = ray;
-        let slowest = ray.shear.depth_rate * SLOWEST;
         let reach = if reach < f32::MAX { larger(0.0, reach) } else { f32::MAX };
         let reach = larger(reach, f32::from_bits(largest_bits(&given.origin)));
         let is_ordinary = is_ordinary(reach);
         let scales = Scales { t: [1.0], space: [1.0], reach: [reach * scale] };
         let ahead = if is_ordinary { *scale } else { 1.0 };
-        let mut axes = [[slowest; 3]; 3];
+        let mut axes = [[SLOWEST; 3]; 3];
         for (axis, (o, d)) in axes.iter_mut().zip(origin.iter().zip(direction)) {
-            let lines = [[*o], [*d], [1.0 / larger(d.abs(), slowest)]];
+            let lines = [[*o], [*d], [1.0 / larger(d.abs(), SLOWEST)]];
             let [[reciprocal], [near_shift], [far_shift]] = walls::<_, 1>(Scalar, lines, &scales);
             // Nothing is lost if boxes are scaled by this.
             let reciprocal = reciprocal * ahead;

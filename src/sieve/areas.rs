@@ -56,7 +56,7 @@ impl<V: Copy> Across<V> {
     {
         let [kx, ky, _] = ray.shear.axes;
         let (kx, ky) = (kx as usize, ky as usize);
-        let [slope_x, slope_y] = ray.shear.slope;
+        let [slope_x, slope_y] = ray.shear.slope();
         let scale = s.splat(ray.scale);
         let (from_x, from_y) = (s.splat(ray.origin[kx]), s.splat(ray.origin[ky]));
         let x = mul_sub::<V, FUSED, N>(s.load(&vertices[kx]), scale, from_x);
@@ -89,7 +89,7 @@ pub(super) fn area<V: Lanes<N>, const FUSED: bool, const N: usize>(
 /// `2.5 u size + 5.5 u steepness deepest`. Here the second part, which all vertices of a block share.
 #[inline(always)]
 pub(super) fn shared_error(ray: &PreparedRay, deepest: f32) -> f32 {
-    ray.shear.blur * deepest
+    ray.shear.blur() * deepest
 }
 
 /// What an area may be off, by the largest [size](Across::size) of the three vertices or more.

@@ -212,7 +212,7 @@ impl Meetings<[f32; 1]> {
         let (above, error) = (rise * inverse, error * inverse);
         let slack = (middle.abs() + above.abs() + error) * (8.0 * UNIT32) + TINY;
         let (near, far) = (above - (error + slack), above + (error + slack));
-        let pace = ray.shear.pace;
+        let pace = ray.shear.pace();
         Interval { near: (middle + near) * pace, far: (middle + far) * pace }
     }
 }

@@ -110,10 +110,14 @@ impl Halves for [f64; 8] {
 pub(crate) trait Quad: Doubles {
     /// Its second, third and first number, and what is beside them.
     fn turned(self) -> Self;
+    /// Its third, first and second number, and what is beside them.
+    fn turned_back(self) -> Self;
     /// Its first number in all lanes.
     fn first(self) -> Self;
     /// Of each vector the sum of its first two numbers, and of that and the third. What is beside them does not count.
     fn sums(vectors: [Self; 4]) -> Self;
+    /// The same of vectors that are turned: of the third number and the first, and of that and the second.
+    fn turned_sums(vectors: [Self; 4]) -> Self;
     fn array(self) -> [f64; 4];
 }
 
@@ -123,12 +127,23 @@ impl Quad for [f64; 4] {
         [y, z, x, w]
     }
 
+    #[inline(always)]
+    fn turned_back(self) -> Self {
+        let [x, y, z, w] = self;
+        [z, x, y, w]
+    }
+
     fn first(self) -> Self {
         [self[0]; 4]
     }
 
     fn sums(vectors: [Self; 4]) -> Self {
         vectors.map(|[x, y, z, _]| x + y + z)
+    }
+
+    #[inline(always)]
+    fn turned_sums(vectors: [Self; 4]) -> Self {
+        vectors.map(|[y, z, x, _]| x + y + z)
     }
 
     fn array(self) -> [f64; 4] {

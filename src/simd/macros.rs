@@ -40,6 +40,11 @@ macro_rules! width {
 macro_rules! by_four {
     () => {
         #[inline(always)]
+        fn three(self, v: F4) -> F4 {
+            v.three()
+        }
+
+        #[inline(always)]
         fn largest_of_three(self, v: F4) -> F4 {
             v.largest_of_three()
         }

@@ -249,6 +249,15 @@ pub(crate) trait Simd: Width<16> + Width<8> + Width<4> {
     /// The floats nearest to doubles.
     fn narrowed(self, doubles: Self::Doubles) -> [f32; 8];
 
+    /// The first three lanes, and zero.
+    #[inline(always)]
+    fn three(self, v: <Self as Width<4>>::V) -> <Self as Width<4>>::V {
+        let mut lanes = [0.0; 4];
+        v.store(&mut lanes);
+        lanes[3] = 0.0;
+        self.load(&lanes)
+    }
+
     /// In the first three lanes the largest of them; any number if one is NaN.
     #[inline(always)]
     fn largest_of_three(self, v: <Self as Width<4>>::V) -> <Self as Width<4>>::V {

@@ -263,13 +263,14 @@ fn every_operation_means_what_the_portable_one_does() {
 /// What is done with three coordinates.
 #[derive(Debug, PartialEq)]
 struct OfThree {
+    three: [u32; 4],
     least: bool,
     chosen: [u32; 4],
     whole: [i32; 4],
     floats: [u32; 4],
 }
 
-/// The operations on four lanes that walks through grids use.
+/// The operations on four lanes of which three count.
 struct WithThree([[f32; 4]; 3]);
 
 impl Kernel for WithThree {
@@ -278,13 +279,15 @@ impl Kernel for WithThree {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> OfThree {
         let Self([a, b, c]) = self;
-        let [mut least, mut chosen, mut floats] = [[0.0; 4]; 3];
+        let [mut three, mut least, mut chosen, mut floats] = [[0.0; 4]; 4];
         let (va, vb) = (Width::<4>::load(s, &a), Width::<4>::load(s, &b));
+        s.three(va).store(&mut three);
         s.least_of_three(va).store(&mut least);
         s.where_less_or_equal(va, vb, Width::<4>::load(s, &c)).store(&mut chosen);
         let whole = s.whole(va);
         s.floats(whole).store(&mut floats);
         OfThree {
+            three: three.map(f32::to_bits),
             // A zero may have either sign.
             least: least[..3].iter().all(|x| *x == a[0].min(a[1]).min(a[2])),
             chosen: chosen.map(f32::to_bits),

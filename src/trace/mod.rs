@@ -125,12 +125,13 @@ fn trace_any<const ORDERED: bool>(
 /// The record of the meeting that won.
 #[inline(never)]
 fn hit<D: Decide>(
+    s: impl Simd,
     block: Finished,
     ray: &PreparedRay,
     best: &D::Met,
     watch: &mut impl Watch,
 ) -> Hit {
-    record(Scalar, block, best.place(), D::t(ray, best, watch), D::weights(best))
+    record(s, block, best.place(), D::t(ray, best, watch), D::weights(best))
 }
 
 /// The record of a meeting.

@@ -69,7 +69,7 @@ impl<'m, D: Decide, W: Watch, const MEMORY: usize> Question<'m> for ClosestHit<D
             query.settle(ray);
         }
         let Closest { best, watch, .. } = query;
-        Some(hit::<D>(block, ray, best.as_ref()?, watch))
+        Some(hit::<D>(s, block, ray, best.as_ref()?, watch))
     }
 
     fn nothing() -> Option<Hit> {

@@ -271,22 +271,27 @@ impl Quad for D4 {
     }
 
     #[inline(always)]
+    fn turned_back(self) -> Self {
+        // SAFETY: as above.
+        D4(unsafe { _mm256_permute4x64_pd::<0xD2>(self.0) })
+    }
+
+    #[inline(always)]
     fn first(self) -> Self {
         // SAFETY: as above.
         D4(unsafe { _mm256_broadcastsd_pd(_mm256_castpd256_pd128(self.0)) })
     }
 
     #[inline(always)]
-    fn sums([a, b, c, d]: [Self; 4]) -> Self {
-        // SAFETY: as above.
-        unsafe {
-            let [first, second] = [_mm256_unpacklo_pd(a.0, b.0), _mm256_unpackhi_pd(a.0, b.0)];
-            let [third, fourth] = [_mm256_unpacklo_pd(c.0, d.0), _mm256_unpackhi_pd(c.0, d.0)];
-            let x = _mm256_permute2f128_pd::<0x20>(first, third);
-            let y = _mm256_permute2f128_pd::<0x20>(second, fourth);
-            let z = _mm256_permute2f128_pd::<0x31>(first, third);
-            D4(_mm256_add_pd(_mm256_add_pd(x, y), z))
-        }
+    fn sums(vectors: [Self; 4]) -> Self {
+        let [x, y, z] = rows(vectors);
+        x.add(y).add(z)
+    }
+
+    #[inline(always)]
+    fn turned_sums(vectors: [Self; 4]) -> Self {
+        let [y, z, x] = rows(vectors);
+        x.add(y).add(z)
     }
 
     #[inline(always)]
@@ -295,5 +300,20 @@ impl Quad for D4 {
         // SAFETY: as above; the array has four doubles.
         unsafe { _mm256_storeu_pd(array.as_mut_ptr(), self.0) };
         array
+    }
+}
+
+/// The first three numbers of four vectors, side by side.
+#[inline(always)]
+fn rows([a, b, c, d]: [D4; 4]) -> [D4; 3] {
+    // SAFETY: a value of this type proves AVX2.
+    unsafe {
+        let [first, second] = [_mm256_unpacklo_pd(a.0, b.0), _mm256_unpackhi_pd(a.0, b.0)];
+        let [third, fourth] = [_mm256_unpacklo_pd(c.0, d.0), _mm256_unpackhi_pd(c.0, d.0)];
+        [
+            D4(_mm256_permute2f128_pd::<0x20>(first, third)),
+            D4(_mm256_permute2f128_pd::<0x20>(second, fourth)),
+            D4(_mm256_permute2f128_pd::<0x31>(first, third)),
+        ]
     }
 }

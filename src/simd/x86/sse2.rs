@@ -46,6 +46,13 @@ impl Simd for Sse2 {
 }
 
 impl F4 {
+    /// See [`Simd::three`].
+    #[inline(always)]
+    pub fn three(self) -> Self {
+        // SAFETY: SSE2 is there.
+        F4(unsafe { _mm_and_ps(self.0, _mm_castsi128_ps(_mm_setr_epi32(-1, -1, -1, 0))) })
+    }
+
     /// See [`Simd::largest_of_three`].
     #[inline(always)]
     pub fn largest_of_three(self) -> Self {
