@@ -3,7 +3,7 @@
 use core::mem::MaybeUninit;
 use std::prelude::v1::*;
 
-use super::{Backend, Kernel, Lanes, Scalar, Simd, Width, native};
+use super::{Backend, Kernel, Lanes, Quad, Scalar, Simd, Width, native};
 
 /// Both zeros, infinities, ones, least and greatest, subnormals, and NaN of both signs, one with a payload.
 const SPECIAL: [u32; 20] = [
@@ -314,6 +314,48 @@ fn three_coordinates_are_treated_alike() {
             // SAFETY: `detected` says that there is this one.
             let got = unsafe { native::run_with(backend, WithThree(lanes)) };
             assert_eq!(got, expected, "{backend:?}: {lanes:?}");
+        }
+    }
+}
+
+/// What is done with four vectors of three doubles.
+struct Quads([[f32; 4]; 4]);
+
+impl Kernel for Quads {
+    /// The bits of what comes out, without what is beside three numbers.
+    type Output = ([[u64; 3]; 2], [u64; 4], [[u64; 4]; 2]);
+
+    fn run<S: Simd>(self, s: S) -> Self::Output {
+        let vectors = self.0.each_ref().map(|floats| s.quad(floats));
+        let bits = |quad: S::Quad| quad.array().map(f64::to_bits);
+        let three = |quad: S::Quad| {
+            let [x, y, z, _] = bits(quad);
+            [x, y, z]
+        };
+        (
+            [three(vectors[0].turned()), three(vectors[0].turned_back())],
+            bits(vectors[1].first()),
+            [bits(Quad::sums(vectors)), bits(Quad::turned_sums(vectors))],
+        )
+    }
+}
+
+#[test]
+fn four_doubles_are_treated_alike() {
+    let best = Backend::detected();
+    let mut state = 3;
+    for _ in 0..20_000 {
+        // Of all sizes, so that it matters in which order they are added.
+        let mut float = || {
+            let bits = random(&mut state);
+            (bits as i32) as f32 * 2f32.powi((bits >> 32) as i32 % 40)
+        };
+        let vectors = [(); 4].map(|()| [(); 4].map(|()| float()));
+        let expected = Quads(vectors).run(Scalar);
+        for backend in Backend::ALL.into_iter().filter(|backend| *backend <= best) {
+            // SAFETY: `detected` says that there is this one.
+            let found = unsafe { native::run_with(backend, Quads(vectors)) };
+            assert_eq!(found, expected, "{backend:?} {vectors:?}");
         }
     }
 }
