@@ -170,9 +170,8 @@ impl<const W: usize> Decided<W> {
     fn set_leaf(&mut self, node: &BvhNode, grounds: &Grounds, shapes: &mut Shapes) -> Option<()> {
         let Grounds { ids, areas, price, .. } = *grounds;
         let (count, is_sphere) = Grown::of(node);
-        let aabb = node.aabb();
-        self.aabb = aabb;
-        self.cost = [LEAF * areas.of(&aabb) + price; W];
+        self.aabb = node.aabb();
+        self.cost = [LEAF * areas.of(&self.aabb) + price; W];
         self.lanes = 1;
         self.content.count = count;
         let alone = count > grounds.together;

@@ -18,13 +18,19 @@ pub(super) const EXPONENT: u32 = f32::INFINITY.to_bits();
 /// The power of two that brings an ordinary number, and all that are not larger, below 1.
 #[inline(always)]
 pub(super) fn scale_below(x: f32) -> f32 {
-    f32::from_bits((253 << 23) - (x.to_bits() & EXPONENT))
+    f32::from_bits(below(x.to_bits()))
 }
 
 /// The same in each lane.
 #[inline(always)]
 pub(super) fn scales_below<S: Simd>(s: S, v: <S as Width<4>>::V) -> <S as Width<4>>::V {
-    by_bits(s, v, |bits| (253u32 << 23).wrapping_sub(bits & EXPONENT))
+    by_bits(s, v, below)
+}
+
+/// The bits of the one by those of the other.
+#[inline(always)]
+fn below(bits: u32) -> u32 {
+    (253u32 << 23).wrapping_sub(bits & EXPONENT)
 }
 
 /// In each lane the power of two that an ordinary number is not below, and below twice of.

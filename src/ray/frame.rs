@@ -35,6 +35,11 @@ pub(crate) struct PreparedRay {
     pub t_max: f32,
 }
 
+const _: () = {
+    let first = core::mem::offset_of!(PreparedRay, shear) + core::mem::offset_of!(Shear, per_depth);
+    assert!(size_of::<PreparedRay>() - first < 64);
+};
+
 /// What the triangle test needs: the axis along which the ray moves most becomes the depth, and the
 /// others are sheared so that the ray runs along it.
 #[derive(Clone, Copy, Debug)]

@@ -127,7 +127,6 @@ impl Quad for [f64; 4] {
         [y, z, x, w]
     }
 
-    #[inline(always)]
     fn turned_back(self) -> Self {
         let [x, y, z, w] = self;
         [z, x, y, w]
@@ -141,7 +140,6 @@ impl Quad for [f64; 4] {
         vectors.map(|[x, y, z, _]| x + y + z)
     }
 
-    #[inline(always)]
     fn turned_sums(vectors: [Self; 4]) -> Self {
         vectors.map(|[y, z, x, _]| x + y + z)
     }

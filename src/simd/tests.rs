@@ -1,5 +1,6 @@
 //! Each operation of each backend of this processor against the portable code, bit for bit.
 
+use core::fmt::Debug;
 use core::mem::MaybeUninit;
 use std::prelude::v1::*;
 
@@ -270,7 +271,19 @@ struct OfThree {
     floats: [u32; 4],
 }
 
+/// What portable code answers, and each backend of this processor.
+fn answer_of_all<K: Kernel<Output: PartialEq + Debug> + Copy + Debug>(kernel: K) -> K::Output {
+    let (best, expected) = (Backend::detected(), kernel.run(Scalar));
+    for backend in Backend::ALL.into_iter().filter(|backend| *backend <= best) {
+        // SAFETY: `detected` says that there is this one.
+        let found = unsafe { native::run_with(backend, kernel) };
+        assert_eq!(found, expected, "{backend:?}: {kernel:?}");
+    }
+    expected
+}
+
 /// The operations on four lanes of which three count.
+#[derive(Clone, Copy, Debug)]
 struct WithThree([[f32; 4]; 3]);
 
 impl Kernel for WithThree {
@@ -299,7 +312,6 @@ impl Kernel for WithThree {
 
 #[test]
 fn three_coordinates_are_treated_alike() {
-    let best = Backend::detected();
     let mut state = 2;
     for _ in 0..20_000 {
         // Whole numbers of up to 31 bits, large and small, of both signs, some equal.
@@ -308,17 +320,12 @@ fn three_coordinates_are_treated_alike() {
             (bits as i32 >> 1 >> (bits >> 32 & 31)) as f32 / [1.0, 4.0][(bits >> 40 & 1) as usize]
         };
         let lanes = [(); 3].map(|()| [(); 4].map(|()| lane()));
-        let expected = WithThree(lanes).run(Scalar);
-        assert!(expected.least);
-        for backend in Backend::ALL.into_iter().filter(|backend| *backend <= best) {
-            // SAFETY: `detected` says that there is this one.
-            let got = unsafe { native::run_with(backend, WithThree(lanes)) };
-            assert_eq!(got, expected, "{backend:?}: {lanes:?}");
-        }
+        assert!(answer_of_all(WithThree(lanes)).least);
     }
 }
 
 /// What is done with four vectors of three doubles.
+#[derive(Clone, Copy, Debug)]
 struct Quads([[f32; 4]; 4]);
 
 impl Kernel for Quads {
@@ -342,7 +349,6 @@ impl Kernel for Quads {
 
 #[test]
 fn four_doubles_are_treated_alike() {
-    let best = Backend::detected();
     let mut state = 3;
     for _ in 0..20_000 {
         // Of all sizes, so that it matters in which order they are added.
@@ -351,11 +357,6 @@ fn four_doubles_are_treated_alike() {
             (bits as i32) as f32 * 2f32.powi((bits >> 32) as i32 % 40)
         };
         let vectors = [(); 4].map(|()| [(); 4].map(|()| float()));
-        let expected = Quads(vectors).run(Scalar);
-        for backend in Backend::ALL.into_iter().filter(|backend| *backend <= best) {
-            // SAFETY: `detected` says that there is this one.
-            let found = unsafe { native::run_with(backend, Quads(vectors)) };
-            assert_eq!(found, expected, "{backend:?} {vectors:?}");
-        }
+        answer_of_all(Quads(vectors));
     }
 }

@@ -122,7 +122,7 @@ fn trace_any<const ORDERED: bool>(
     trace(Scalar, block, (&Early, prepared), slab, &mut query)
 }
 
-/// The record of the meeting that won.
+/// The record of the meeting that won. A backend writes it as a whole here too, for whoever copies it.
 #[inline(never)]
 fn hit<D: Decide>(
     s: impl Simd,
