@@ -136,6 +136,17 @@ fn rays_of_a_camera() {
     }
 }
 
+/// Packets of which each ray comes to strands of its own, so that streams follow them; and no packets after them.
+#[test]
+fn rays_that_share_little_on_their_way() {
+    let hair: Model = make::hair(40_000, 1).into();
+    let (mut rays, odd) =
+        (camera(64, [3.0, 0.5, 1.0], [0.0; 3], 1.0), camera(24, [-3.0, 1.0, 0.3], [0.0; 3], 1.0));
+    rays.extend(with_odd_ones(odd));
+    let hits = same_in_all(&hair, &rays);
+    assert!(hits > 10_000, "{hits}");
+}
+
 /// Single floats do not tell on which side of the triangle they start or end.
 #[test]
 fn rays_that_leave_a_large_triangle() {

@@ -5,6 +5,7 @@ mod flights;
 mod packet;
 mod stream;
 mod walkers;
+mod work;
 
 use crate::block::bundle::Bundle;
 use crate::block::{Block, Bundles, Finished, KIND_GRID};
@@ -21,6 +22,8 @@ const NEAR: [usize; 2] = [2 << 20, 16 << 20];
 const SMALL: usize = 128 << 10;
 /// Fewer rays through a grid are faster one by one: making place for sixteen takes as long as some five rays.
 const MANY: usize = 64;
+/// After packets that had better been a stream so many rays are one, whatever they are.
+const AFTER_THIN: usize = 1024;
 /// How far apart two rays begin that have nothing to do with each other, of the scene's largest coordinate.
 const FAR: f32 = 1.0 / 64.0;
 /// So many rays are looked at for that.
@@ -121,18 +124,22 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
             return self.walk(s);
         }
         let count = self.rays.len().min(self.answers.len());
-        let (mut first, mut room) = (0, None);
+        let (mut first, mut room, mut thin) = (0, None, false);
         while first < count {
-            let (alike, end) = self.stretch(s, first, count);
+            let (alike, end) = match thin {
+                true => (None, count.min(first + AFTER_THIN)),
+                false => self.stretch(s, first, count),
+            };
             let part = self.part(first, end);
-            match alike {
-                Some(alike) => {
-                    let room = room.get_or_insert_with(|| packet::Room::new(alike));
-                    part.trace_together(s, alike, room);
-                }
-                None => part.trace_apart(s),
-            }
-            first = end;
+            let Some(alike) = alike else {
+                let manner = if thin { Manner::Stream } else { part.manner };
+                Batch { manner, ..part }.trace_apart(s);
+                (first, thin) = (end, false);
+                continue;
+            };
+            let room = room.get_or_insert_with(|| packet::Room::new(alike));
+            part.trace_together(s, alike, room);
+            (first, thin) = (end, room.work.is_thin());
         }
     }
 }

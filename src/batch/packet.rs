@@ -1,5 +1,6 @@
 //! Rays that are alike: as one thick ray through the bundles, and side by side through the leaves.
 
+use super::work::Work;
 use super::{Batch, Record};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, TriangleBlock, block_ref};
@@ -8,7 +9,7 @@ use crate::math::Bits;
 use crate::math::rounding::{f32_above, f32_below};
 use crate::prim::Leaves;
 use crate::query::{Exact, Query};
-use crate::ray::{Alike, GROUPS, RayPacket, Sixteen, WideBoxes};
+use crate::ray::{Alike, Entered, GROUPS, RayPacket, Sixteen};
 use crate::sieve::{Aim, Found, Opened, Sheared};
 use crate::simd::{Lanes, Scalar, Simd, Width};
 use crate::trace::{Firsts, Together};
@@ -17,11 +18,12 @@ use crate::trace::{Firsts, Together};
 pub(super) struct Room {
     packet: RayPacket,
     sheared: Sheared,
+    pub work: Work,
 }
 
 impl Room {
     pub fn new(alike: Alike) -> Self {
-        Room { packet: RayPacket::new(alike), sheared: [[[0.0; 16]; 2]; 16] }
+        Room { packet: RayPacket::new(alike), sheared: [[[0.0; 16]; 2]; 16], work: Work::default() }
     }
 }
 
@@ -41,13 +43,15 @@ struct Company<'a, 'm, Q: Together<'m>, A> {
     near: [Sixteen; GROUPS],
     /// All bits, unless some primitives are left out: then each is asked for alone.
     trusted: u32,
+    work: &'a mut Work,
 }
 
 impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
     /// Traces rays that are alike, 16 for each of the [groups](GROUPS) at most.
     #[inline(always)]
     pub(super) fn trace_together<S: Simd>(self, s: S, alike: Alike, room: &mut Room) {
-        let Room { packet, sheared } = room;
+        let Room { packet, sheared, work } = room;
+        work.set_out(self.rays.len());
         let sound = packet.set(s, alike, self.rays);
         let mut company = Company {
             leaves: Leaves::of(self.block),
@@ -56,6 +60,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
             firsts: [Firsts::NONE; GROUPS],
             near: [[f32::INFINITY; 16]; GROUPS],
             trusted: if self.question.sees_all() { u32::MAX } else { 0 },
+            work,
             batch: self,
         };
         company.descend(s, sheared);
@@ -74,9 +79,10 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
                 let Some(bundle) = self.batch.bundles.get(walk.at().bundle_number()) else {
                     return;
                 };
-                let (entered, near) = hull.entered::<true>(&bundle.walls, bound);
-                self.fetch(s, bundle, entered);
-                if !walk.go_on(s, bundle, (entered, near), Q::Query::ORDERED) {
+                let Entered { boxes, near, tests, visits } = hull.enters(&bundle.walls, bound);
+                self.work.at_bundle(tests, visits);
+                self.fetch(s, bundle, boxes);
+                if !walk.go_on(s, bundle, (boxes, near), Q::Query::ORDERED) {
                     return;
                 }
             }
@@ -129,6 +135,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
         }
         for (group, entered) in entered.into_iter().enumerate() {
             if entered != 0 {
+                self.work.at_leaf(entered);
                 self.look(s, group, entered, block, &opened, room);
             }
         }

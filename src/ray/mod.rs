@@ -17,7 +17,7 @@ pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
 pub(crate) use frame::{PreparedRay, TINY};
-pub(crate) use packet::{GROUPS, RayPacket, Spread};
+pub(crate) use packet::{Entered, GROUPS, RayPacket, Spread};
 pub(crate) use prepare::{Early, Late};
 pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
 

@@ -157,32 +157,53 @@ pub(crate) struct Hull<'p, S, V> {
     first: [usize; 3],
 }
 
+/// The boxes that a [`Hull`] enters.
+pub(crate) struct Entered<V> {
+    /// One bit each.
+    pub boxes: u32,
+    /// Where at the earliest.
+    pub near: V,
+    /// How many boxes the rays were tested against, and into how many of them those of the first group go, added up.
+    pub tests: u32,
+    pub visits: u32,
+}
+
 impl<S: Width<16>> WideBoxes<S, 16> for Hull<'_, S, S::V> {
     #[inline(always)]
     fn entered<const FUSED: bool>(&self, walls: &[[f32; 16]; 6], t_bound: S::V) -> (u32, S::V) {
+        let Entered { boxes, near, .. } = self.enters(walls, t_bound);
+        (boxes, near)
+    }
+}
+
+impl<S: Width<16>> Hull<'_, S, S::V> {
+    /// `walls` are lower x y z, then upper x y z.
+    #[inline(always)]
+    pub fn enters(&self, walls: &[[f32; 16]; 6], t_bound: S::V) -> Entered<S::V> {
         let [x, y, z] = [self.between(walls, 0), self.between(walls, 1), self.between(walls, 2)];
         let near = x[0].max(y[0]).max(z[0].max(self.low));
         let far = x[1].min(y[1]).min(z[1].min(t_bound));
-        let mut entered = near.less_or_equal(far);
-        let mut rest = entered;
+        let mut boxes = near.less_or_equal(far);
+        let (tests, mut visits) = (boxes.count_ones(), 0);
+        let mut rest = boxes;
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % 16;
             rest &= rest - 1;
             let [x, y, z] = self.first;
             let first = [walls[x][lane], walls[y][lane], walls[z][lane]];
             let last = [walls[3 - x][lane], walls[5 - y][lane], walls[7 - z][lane]];
-            let mut rays = 0;
+            let [group, groups @ ..] = &self.rays.groups;
+            let mut rays = group.entered(self.s, first, last);
+            visits += rays.count_ones();
             // Without a branch, as it is hard to foretell which of them enters.
-            for group in &self.rays.groups {
+            for group in groups {
                 rays |= group.entered(self.s, first, last);
             }
-            entered &= !(u32::from(rays == 0) << lane);
+            boxes &= !(u32::from(rays == 0) << lane);
         }
-        (entered, near)
+        Entered { boxes, near, tests, visits }
     }
-}
 
-impl<S: Width<16>> Hull<'_, S, S::V> {
     /// The least and the largest distance between the walls across an axis.
     #[inline(always)]
     fn between(&self, walls: &[[f32; 16]; 6], k: usize) -> [S::V; 2] {
