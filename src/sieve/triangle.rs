@@ -103,8 +103,12 @@ pub(crate) fn triangles<S: Simd + Width<N>, const FREE: bool, const N: usize>(
         corner::<S, N>(s, &across, b),
         corner::<S, N>(s, &across, c),
     ];
-    let size = across.size();
-    let [x, y, z] = Width::<N>::of_corners(s, size, [a, b, c]);
+    // One at a time where lanes are not picked out of a block by one instruction.
+    let [x, y, z] = if S::IN_HALVES {
+        [corners[0].size(), corners[1].size(), corners[2].size()]
+    } else {
+        Width::<N>::of_corners(s, across.size(), [a, b, c])
+    };
     let size = x.max(y).max(z);
     let error = AreaError::new(s, Width::<N>::splat(s, shared_error(ray, middle.deepest[0])));
     let areas = Areas::new::<FREE, N>(&corners, error.of::<S, FREE, N>(s, size));
