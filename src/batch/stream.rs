@@ -9,8 +9,8 @@ use crate::bvh::{SharedStack, fetch};
 use crate::math::Bits;
 use crate::prim::Leaves;
 use crate::query::Query;
-use crate::ray::{NarrowSlab, PreparedRay, Slab, WideBoxes};
-use crate::simd::{Lanes, Simd, Width};
+use crate::ray::{Interval, NarrowSlab, PreparedRay};
+use crate::simd::{Simd, Width};
 use crate::trace::Question;
 
 /// So many rays go together: one bit of a word each. 64 are no faster.
@@ -120,11 +120,9 @@ impl<Q: Query> Stream<'_, '_, Q> {
                 continue;
             };
             let t_bound = Width::<16>::splat(s, query.t_bound());
-            let (children, near) = slab.wide::<S, 16>(s).entered::<true>(&bundle.walls, t_bound);
-            Width::<16>::add_to_words(s, children, 1 << lane, &mut entered);
-            if Q::ORDERED {
-                least = Width::<16>::select(s, children, near.min(least), least);
-            }
+            let boxes = slab.boxes::<S, 16>(s);
+            let Interval { near, far } = boxes.part::<true, 16>(&bundle.walls, t_bound);
+            least = Width::<16>::note(s, [near, far], 1 << lane, &mut entered, least);
         }
         let lanes = Width::<16>::used_words(s, &entered);
         for child in Bits(lanes) {

@@ -90,6 +90,23 @@ impl NarrowSlab {
         slab
     }
 
+    /// In the vectors of a backend.
+    #[inline(always)]
+    pub fn boxes<S: Width<N>, const N: usize>(&self, s: S) -> NarrowBoxes<S, S::V> {
+        NarrowBoxes {
+            reciprocal: splat(s, self.reciprocal),
+            near_shift: splat(s, self.near_shift),
+            far_shift: splat(s, self.far_shift),
+            t_min: s.splat(self.t_min),
+            first: [0, 1, 2].map(|k| {
+                // All ones if the ray runs back: a mask, and numbers of floats, are the least that each bundle can do with.
+                let back = (self.reciprocal[k].to_bits() as i32 >> 31) as usize;
+                k * N + ((3 * N) & back)
+            }),
+            s,
+        }
+    }
+
     /// The same for boxes that are wider by `by`, in given coordinates, on all sides.
     ///
     /// Three roundings of the shift are granted, of which one sum and a product use two.
@@ -144,18 +161,7 @@ impl Slab for NarrowSlab {
 
     #[inline(always)]
     fn wide<'a, S: Width<N> + 'a, const N: usize>(&'a self, s: S) -> impl WideBoxes<S, N> + 'a {
-        NarrowBoxes {
-            reciprocal: splat(s, self.reciprocal),
-            near_shift: splat(s, self.near_shift),
-            far_shift: splat(s, self.far_shift),
-            t_min: s.splat(self.t_min),
-            first: [0, 1, 2].map(|k| {
-                // All ones if the ray runs back: a mask, and numbers of floats, are the least that each bundle can do with.
-                let back = (self.reciprocal[k].to_bits() as i32 >> 31) as usize;
-                k * N + ((3 * N) & back)
-            }),
-            s,
-        }
+        self.boxes(s)
     }
 }
 
@@ -184,7 +190,7 @@ fn splat<S: Width<N>, const N: usize>(s: S, [x, y, z, _]: [f32; 4]) -> [S::V; 3]
 }
 
 /// A [`NarrowSlab`] with each number in all lanes.
-struct NarrowBoxes<S, V> {
+pub(crate) struct NarrowBoxes<S, V> {
     s: S,
     reciprocal: [V; 3],
     near_shift: [V; 3],
@@ -197,6 +203,23 @@ struct NarrowBoxes<S, V> {
 impl<S: Width<N>, const N: usize> WideBoxes<S, N> for NarrowBoxes<S, S::V> {
     #[inline(always)]
     fn entered<const FUSED: bool>(&self, walls: &[[f32; N]; 6], t_bound: S::V) -> (u32, S::V) {
+        let Interval { near, far } = self.part::<FUSED, N>(walls, t_bound);
+        (near.less_or_equal(far), near)
+    }
+}
+
+impl<S, V: Copy> NarrowBoxes<S, V> {
+    /// The parts inside the boxes, up to `t_bound`.
+    #[inline(always)]
+    pub fn part<const FUSED: bool, const N: usize>(
+        &self,
+        walls: &[[f32; N]; 6],
+        t_bound: V,
+    ) -> Interval<V>
+    where
+        S: Width<N, V = V>,
+        V: Lanes<N>,
+    {
         let [x, y, z] = [
             self.between::<FUSED, N>(walls, 0),
             self.between::<FUSED, N>(walls, 1),
@@ -205,11 +228,9 @@ impl<S: Width<N>, const N: usize> WideBoxes<S, N> for NarrowBoxes<S, S::V> {
         // In pairs, so that they wait less for each other.
         let near = x.near.max(y.near).max(z.near.max(self.t_min));
         let far = x.far.min(y.far).min(z.far.min(t_bound));
-        (near.less_or_equal(far), near)
+        Interval { near, far }
     }
-}
 
-impl<S, V: Copy> NarrowBoxes<S, V> {
     /// The parts between the two walls across an axis.
     #[inline(always)]
     fn between<const FUSED: bool, const N: usize>(

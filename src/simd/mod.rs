@@ -173,6 +173,20 @@ pub(crate) trait Width<const N: usize>: Copy {
         }
     }
 
+    /// Where `near <= far`: sets the bits of `bits` in the words, and takes `near` where it is less than the lane of `least`.
+    #[inline(always)]
+    fn note(
+        self,
+        [near, far]: [Self::V; 2],
+        bits: u32,
+        words: &mut [u32; N],
+        least: Self::V,
+    ) -> Self::V {
+        let mask = near.less_or_equal(far);
+        self.add_to_words(mask, bits, words);
+        self.select(mask, near.min(least), least)
+    }
+
     /// One bit for each word that is not zero.
     #[inline(always)]
     fn used_words(self, words: &[u32; N]) -> u32 {

@@ -117,15 +117,20 @@ doubled! {
     }
 
     #[inline(always)]
-    fn add_to_words(self, mask: u32, bits: u32, words: &mut [u32; 16]) {
+    fn note(
+        self,
+        [near, far]: [Two<F8>; 2],
+        bits: u32,
+        words: &mut [u32; 16],
+        least: Two<F8>,
+    ) -> Two<F8> {
         // SAFETY: the token proves AVX2; the array has 16 words.
         unsafe {
-            let (all, low) = (_mm256_set1_epi32(bits as i32), words.as_mut_ptr().cast::<__m256i>());
-            let high = low.add(1);
-            let added = _mm256_and_si256(lanes_of(mask), all);
-            _mm256_storeu_si256(low, _mm256_or_si256(_mm256_loadu_si256(low), added));
-            let added = _mm256_and_si256(lanes_of(mask >> 8), all);
-            _mm256_storeu_si256(high, _mm256_or_si256(_mm256_loadu_si256(high), added));
+            let low = words.as_mut_ptr().cast::<__m256i>();
+            Two(
+                note([near.0, far.0], bits, low, least.0),
+                note([near.1, far.1], bits, low.add(1), least.1),
+            )
         }
     }
 
@@ -208,6 +213,22 @@ impl F8 {
             let count = mask.count_ones();
             sort::sort(near, words, count, near_out.as_mut_ptr(), words_out.as_mut_ptr())
         }
+    }
+}
+
+/// [`Width::note`] for eight lanes and words.
+///
+/// # Safety
+///
+/// The processor has AVX2; the words may be written to.
+#[inline(always)]
+unsafe fn note([near, far]: [F8; 2], bits: u32, words: *mut __m256i, least: F8) -> F8 {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let lanes = _mm256_cmp_ps::<_CMP_LE_OQ>(near.0, far.0);
+        let added = _mm256_and_si256(_mm256_castps_si256(lanes), _mm256_set1_epi32(bits as i32));
+        _mm256_storeu_si256(words, _mm256_or_si256(_mm256_loadu_si256(words), added));
+        F8(_mm256_blendv_ps(least.0, near.min(least).0, lanes))
     }
 }
 
