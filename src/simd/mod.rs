@@ -165,14 +165,6 @@ pub(crate) trait Width<const N: usize>: Copy {
         core::array::from_fn(|k| core::array::from_fn(|i| rows[i][k]))
     }
 
-    /// Sets the bits of `bits` in the words of `mask`.
-    #[inline(always)]
-    fn add_to_words(self, mask: u32, bits: u32, words: &mut [u32; N]) {
-        for (i, place) in words.iter_mut().enumerate() {
-            *place |= if mask >> i & 1 == 1 { bits } else { 0 };
-        }
-    }
-
     /// Where `near <= far`: sets the bits of `bits` in the words, and takes `near` where it is less than the lane of `least`.
     #[inline(always)]
     fn note(
@@ -183,7 +175,9 @@ pub(crate) trait Width<const N: usize>: Copy {
         least: Self::V,
     ) -> Self::V {
         let mask = near.less_or_equal(far);
-        self.add_to_words(mask, bits, words);
+        for (i, place) in words.iter_mut().enumerate() {
+            *place |= if mask >> i & 1 == 1 { bits } else { 0 };
+        }
         self.select(mask, near.min(least), least)
     }
 

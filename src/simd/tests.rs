@@ -100,11 +100,19 @@ fn masked<S: Width<16>>(s: S, input: &Input) {
     let rows = core::array::from_fn(|i| rows[i * 5 % 9]);
     let bits = |table: [[f32; 16]; 8]| table.map(|column| column.map(f32::to_bits));
     assert_eq!(bits(s.columns(&rows)), bits(Scalar.columns(&rows)), "columns");
-    s.add_to_words(mask, 1 << 20, &mut words);
-    Scalar.add_to_words(mask, 1 << 20, &mut expected);
-    assert_eq!(words, expected, "add_to_words {mask:x}");
+    let bits_of = |v: [f32; 16]| v.map(f32::to_bits);
+    let (mut noted, least) = (words, noted_by(s, &input.lanes, &mut words));
+    let expected = noted_by(Scalar, &input.lanes, &mut noted);
+    assert_eq!((words, bits_of(least)), (noted, bits_of(expected)), "note");
     s.set_words(mask, 0, &mut words);
     assert_eq!(s.used_words(&words), Scalar.used_words(&words), "used_words {words:x?}");
+}
+
+/// The words and the least lanes after a ray is noted that enters where the first lanes are not above the second ones.
+#[inline(always)]
+fn noted_by<S: Width<16>>(s: S, [a, b, c]: &[[f32; 16]; 3], words: &mut [u32; 16]) -> [f32; 16] {
+    let span = [Width::<16>::load(s, a), Width::<16>::load(s, b)];
+    stored(Width::<16>::note(s, span, 1 << 20, words, Width::<16>::load(s, c)))
 }
 
 #[inline(always)]

@@ -137,13 +137,15 @@ width! {
     }
 
     #[inline(always)]
-    fn add_to_words(self, mask: u32, bits: u32, words: &mut [u32; 16]) {
+    fn note(self, [near, far]: [F16; 2], bits: u32, words: &mut [u32; 16], least: F16) -> F16 {
         // SAFETY: the token proves AVX-512 F; the array has 16 words.
         unsafe {
-            let (place, bits) = (words.as_mut_ptr().cast(), _mm512_set1_epi32(bits as i32));
+            let lanes = _mm512_cmp_ps_mask::<_CMP_LE_OQ>(near.0, far.0);
+            let place = words.as_mut_ptr().cast();
             let before = _mm512_loadu_si512(place);
-            let after = _mm512_mask_or_epi32(before, mask as __mmask16, before, bits);
-            _mm512_storeu_si512(place, after);
+            let bits = _mm512_set1_epi32(bits as i32);
+            _mm512_storeu_si512(place, _mm512_mask_or_epi32(before, lanes, before, bits));
+            F16(_mm512_mask_min_ps(least.0, lanes, near.0, least.0))
         }
     }
 
