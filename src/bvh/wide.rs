@@ -74,8 +74,22 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         let Some(bundle) = bundles.get(self.at.bundle_number()) else { return false };
         query.watch().step();
         let goes_on = self.enter::<S, Q, W>(s, bundle, boxes, t_bounds);
-        fetch(s, bundles, leaves, self.later());
+        self.fetch_later::<S, Q, W>(s, bundles, leaves);
         goes_on
+    }
+
+    /// Has a child fetched that is not next but may be visited after that, so that memory answers both at once. Any hits are mostly
+    /// found before that: for them only what is far away is worth it.
+    #[inline(always)]
+    fn fetch_later<S: Simd, Q: Query, const W: usize>(
+        &self,
+        s: S,
+        bundles: &[Bundle<W>],
+        leaves: &Leaves,
+    ) {
+        if Q::ORDERED || size_of_val(leaves.triangle_blocks) > NEAR {
+            fetch(s, bundles, leaves, self.stack.top());
+        }
     }
 
     /// Goes from the root to the first leaf; false if there is none.
@@ -148,12 +162,6 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         self.at = self.stack.pop();
     }
 
-    /// What comes after that, if nothing is entered or culled before.
-    #[inline(always)]
-    pub fn later(&self) -> ChildRef {
-        self.stack.top()
-    }
-
     /// Nothing beyond this `t` of the frame is visited any more.
     #[inline(always)]
     pub fn t_bound(&self) -> f32 {
@@ -192,11 +200,14 @@ pub(crate) fn traverse_wide<S: Simd + Width<W>, Q: Query, const W: usize>(
         if walk.open(s, leaves, ray, query) {
             return true;
         }
-        fetch(s, bundles, leaves, walk.later());
+        walk.fetch_later::<S, Q, W>(s, bundles, leaves);
     }
 }
 
-/// Has a child fetched that is not next but may be visited after that, so that memory answers both at once.
+/// Fewer bytes of leaf blocks are near: most of what rays visit is in some cache.
+const NEAR: usize = 6 << 20;
+
+/// Has a child fetched.
 ///
 /// Without a branch on what it is, which would be guessed wrong; spheres are fetched in vain.
 #[inline(always)]
