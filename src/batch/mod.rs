@@ -126,20 +126,23 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Kernel for Batch<'_, 'm, Q, A> {
         let count = self.rays.len().min(self.answers.len());
         let (mut first, mut room, mut thin) = (0, None, false);
         while first < count {
-            let (alike, end) = match thin {
-                true => (None, count.min(first + AFTER_THIN)),
-                false => self.stretch(s, first, count),
+            let (manner, (alike, end)) = match thin {
+                true => (Manner::Stream, (None, count.min(first + AFTER_THIN))),
+                false => (self.manner, self.stretch(s, first, count)),
             };
-            let part = self.part(first, end);
-            let Some(alike) = alike else {
-                let manner = if thin { Manner::Stream } else { part.manner };
-                Batch { manner, ..part }.trace_apart(s);
-                (first, thin) = (end, false);
-                continue;
+            let part = Batch { manner, ..self.part(first, end) };
+            first = end;
+            thin = match alike {
+                Some(alike) => {
+                    let room = room.get_or_insert_with(|| packet::Room::new(alike));
+                    part.trace_together(s, alike, room);
+                    room.work.is_thin()
+                }
+                None => {
+                    part.trace_apart(s);
+                    false
+                }
             };
-            let room = room.get_or_insert_with(|| packet::Room::new(alike));
-            part.trace_together(s, alike, room);
-            (first, thin) = (end, room.work.is_thin());
         }
     }
 }
