@@ -61,7 +61,7 @@ struct Spread {
     cells: f64,
     /// The share of them that is near the next one.
     in_order: f64,
-    /// How unlike the areas of their boxes are, by a sample and the largest: 1 if they are all alike, about `n / k` if `k` of `n` have most of the area.
+    /// How unlike the areas of their boxes are, by a sample without the largest: 1 if they are all alike, about `n / k` if `k` of `n` have most of the area.
     unevenness: f64,
 }
 
@@ -72,11 +72,11 @@ impl Spread {
         sample.take(scene, &grid);
         let (all, taken) = (f64::from(census.hittable()), sample.count as f64);
         let share = all / taken;
-        // A sample says nothing of one that is much larger than the others.
+        // A few that are much larger than all others stand apart in a BVH: if one of them is in the sample, it stands for no others.
         let longest = f64::from(census.longest) * grid.per_longest;
-        let largest = longest * longest;
-        let areas = share * sample.areas + largest;
-        let squares = share * sample.squares + largest * largest;
+        let apart = if 2.0 * sample.largest > longest * longest { sample.largest } else { 0.0 };
+        let areas = share * (sample.areas - apart);
+        let squares = share * (sample.squares - apart * apart);
         Spread {
             across: cube_root(all),
             mean: 1.0 + sample.pairs() * all / (taken * (taken - 1.0)),
@@ -170,6 +170,8 @@ struct Sample {
     /// The areas of their boxes, and the squares of these; half of them, in squares of the scene's longest edge.
     areas: f64,
     squares: f64,
+    /// The largest of these areas.
+    largest: f64,
 }
 
 /// The corners of a box.
@@ -189,6 +191,7 @@ impl Sample {
             near: 0,
             areas: 0.0,
             squares: 0.0,
+            largest: 0.0,
         }
     }
 
@@ -244,6 +247,7 @@ impl Sample {
         if area <= 4.0 {
             self.areas += area;
             self.squares += area * area;
+            self.largest = self.largest.max(area);
         }
     }
 

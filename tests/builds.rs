@@ -377,8 +377,11 @@ fn the_choice_follows_the_rays_and_the_scene() {
     let mut in_order: Model = make::plane(30_000).into();
     let mut on_a_floor = mixed(&in_order);
     for model in [&mut in_order, &mut on_a_floor] {
-        model.meshes.push(make::plane(2).placed(10.0, [-5.0, -5.0, -1.0]));
+        model.meshes.push(make::plane(32).placed(10.0, [-5.0, -5.0, -1.0]));
     }
+    // Two triangles stand apart, and are no matter.
+    let mut on_two = mixed_surface.clone();
+    on_two.meshes.push(make::plane(2).placed(10.0, [-5.0, -5.0, -1.0]));
     let (fast, balanced, best) = (Quality::Fast, Quality::Balanced, Quality::Best);
     let cases = [
         ("many", &surface, balanced, 0.0, "balanced"),
@@ -405,6 +408,7 @@ fn the_choice_follows_the_rays_and_the_scene() {
         ("very uneven", &on_a_floor, balanced, 0.2, "nested"),
         ("very uneven", &on_a_floor, balanced, 1.0, "fast"),
         ("very uneven, in order", &in_order, balanced, 0.2, "fast"),
+        ("on two triangles", &on_two, balanced, 0.2, "fast"),
         ("a handful", &handful, balanced, 0.05, "list"),
     ];
     let wrong: Vec<_> = cases

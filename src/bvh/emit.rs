@@ -222,6 +222,7 @@ mod tests {
             leaves: LEAVES,
             source: None,
             leaf_max: 1,
+            apart: 0,
             blocks: None,
             mixed: false,
             depth: Depth::Deep,

@@ -7,7 +7,7 @@ use super::places::Places;
 use super::refs::{PrimRef, gather, refs_per_prim};
 use super::runs::put_into_runs;
 use super::split::Areas;
-use super::spread::unevenness_of_all;
+use super::spread::Spread;
 use crate::block::Census;
 use crate::block::leaf::{SPHERES, TRIANGLES, TRIANGLES_AT_LEAST};
 use crate::prim::Source;
@@ -33,6 +33,8 @@ pub(super) struct Plan {
     pub places: Places,
     /// Of refs, or of [runs](super::runs).
     pub count: usize,
+    /// So many of them, at the front, are much larger than the others, which are even without them.
+    pub apart: usize,
     pub leaf_max: usize,
     /// The effort where areas are uneven.
     pub uneven: Option<Effort>,
@@ -54,15 +56,29 @@ impl Plan {
         let refs = storage::view_mut::<PrimRef>(bytes, 0, places.room)?;
         let Gathered { count, strip, leaves } =
             gather_strips(source.scene, census, places.leaves, how, refs);
-        let unevenness = unevenness_of_all(refs.get(..count)?, areas, how.caller);
-        let uneven = how.effort.for_uneven(unevenness);
+        let gathered = refs.get_mut(..count)?;
+        let spread = Spread::of(gathered, areas, how.caller);
+        let mut uneven = how.effort.for_uneven(spread.unevenness());
+        let mut apart = 0;
+        if uneven.is_some() && !how.effort.cuts {
+            apart = spread.set_apart(gathered, &how.effort);
+            uneven = uneven.filter(|_| apart == 0);
+        }
         let (prims, still) = (census.hittable(), census.sphere_count == 0 && !census.refit);
         let cut = uneven.is_some_and(|effort| effort.cuts) && still;
         if uneven.is_none() && how.effort.blocks && census.triangle_count == prims {
-            let count = (count, prims as usize);
-            if let Some(places) = put_into_runs(count, &places, source, areas, bytes) {
+            let refs = (count, apart, prims as usize);
+            if let Some(places) = put_into_runs(refs, &places, source, areas, bytes) {
                 let count = places.room;
-                return Some(Plan { places, count, leaf_max: 1, uneven, cut, in_runs: true });
+                return Some(Plan {
+                    places,
+                    count,
+                    apart,
+                    leaf_max: 1,
+                    uneven,
+                    cut,
+                    in_runs: true,
+                });
             }
         }
         let places = match uneven {
@@ -70,7 +86,7 @@ impl Plan {
             None => Places { leaves, ..places },
         };
         let leaf_max = leaf_max(census, strip);
-        Some(Plan { places, count, leaf_max, uneven, cut, in_runs: false })
+        Some(Plan { places, count, apart, leaf_max, uneven, cut, in_runs: false })
     }
 }
 

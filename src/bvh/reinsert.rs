@@ -264,6 +264,7 @@ mod tests {
             source: None,
             blocks: None,
             leaf_max: 5,
+            apart: 0,
             mixed: false,
             depth: Depth::Deep,
             effort,

@@ -11,19 +11,19 @@ use crate::prim::{Shapes, Source};
 use crate::simd::prefetch;
 use crate::storage;
 
-/// Of fewer refs no runs are made.
-const FROM: usize = 64;
+/// Of fewer refs no runs are made: what they save is over in a millisecond, and of few leaves each matters to rays.
+const FROM: usize = 4096;
 
 /// The bytes that a run takes in the end: its block, and its part of the bundles as `needs` has it.
 const FINISHED: usize = size_of::<TriangleBlock>() + 42;
 
-/// Replaces the first `count` refs, of `prims` primitives, by runs, which go where the refs were. The places for these are returned,
-/// and an `order` is left behind for [`name_ids`]. `None` where there are too few refs, too little room, or too
-/// many runs: then the refs are still there.
+/// Replaces the first `count` refs, of `prims` primitives, by runs, each of the first `apart` by one of its own. These go where the
+/// refs were; the places for them are returned, and an `order` is left behind for [`name_ids`]. `None` where there are too few refs,
+/// too little room, or too many runs: then the refs are still there.
 ///
 /// `bytes` begin with the refs.
 pub(super) fn put_into_runs(
-    (count, prims): (usize, usize),
+    (count, apart, prims): (usize, usize, usize),
     places: &Places,
     source: Source,
     areas: Areas,
@@ -36,10 +36,17 @@ pub(super) fn put_into_runs(
     let (runs, order) = rest.split_at_mut_checked(REF * count)?;
     let refs = storage::view::<PrimRef>(refs, 0, count).filter(|refs| refs.len() >= FROM)?;
     let (keys, spare) = storage::view_mut::<u64>(keys, 0, 2 * count)?.split_at_mut(count);
+    let (large, refs) = refs.split_at_checked(apart)?;
+    let (keys, spare) = (keys.get_mut(apart..)?, spare.get_mut(apart..)?);
     let along = Along { refs, keys: along_curve(refs, keys, spare) };
     let runs = storage::view_mut::<PrimRef>(runs, 0, count)?;
     let order = storage::view_mut::<u32>(order, 0, prims)?;
-    let run_count = cut_into_runs(&along, source, areas, runs, order)?;
+    let mut runs = Runs { runs, order, count: 0, ids: 0 };
+    for one in large.chunks(1) {
+        runs.push(one)?;
+    }
+    cut_into_runs(&along, source, areas, &mut runs)?;
+    let run_count = runs.count;
     let size = places.refs + bytes.len();
     let places = places.fitting(run_count, run_count, size)?;
     let place = (places.nodes - places.refs).checked_sub(2 * size_of::<u32>() * prims)?;
@@ -79,39 +86,47 @@ struct Along<'r> {
     keys: &'r [u64],
 }
 
-/// Writes runs of refs, and the ids of their primitives to `order`, whose entries are the ids of the runs. Returns the number of
-/// runs.
-fn cut_into_runs(
-    along: &Along,
-    source: Source,
-    areas: Areas,
-    runs: &mut [PrimRef],
-    order: &mut [u32],
-) -> Option<usize> {
+/// Runs, and the ids of their primitives: the id of a run is where these begin.
+struct Runs<'r> {
+    runs: &'r mut [PrimRef],
+    order: &'r mut [u32],
+    count: usize,
+    ids: usize,
+}
+
+impl Runs<'_> {
+    /// Adds a run of these refs.
+    fn push(&mut self, refs: &[PrimRef]) -> Option<()> {
+        let mut run = PrimRef::run(self.ids);
+        for r in refs {
+            let end = self.ids + r.count();
+            for (place, id) in self.order.get_mut(self.ids..end)?.iter_mut().zip(r.id()..) {
+                *place = id;
+            }
+            self.ids = end;
+            run.take_in(r);
+        }
+        *self.runs.get_mut(self.count)? = run;
+        self.count += 1;
+        Some(())
+    }
+}
+
+/// Writes runs of refs that follow each other.
+fn cut_into_runs(along: &Along, source: Source, areas: Areas, runs: &mut Runs) -> Option<()> {
     let mut shapes = source.shapes();
     let mut seen = Seen::NOTHING;
     let mut part = Part { refs: [PrimRef::NONE; PART], fresh: [0; PART], count: 0 };
-    let (mut run_count, mut id_count) = (0, 0);
     for first in (0..along.keys.len()).step_by(PART) {
         part.read(along, first, &mut shapes, &mut seen);
         let mut at = 0;
         while at < part.count {
             let length = part.length(at, areas);
-            let mut run = PrimRef::run(id_count);
-            for r in part.refs.get(at..at + length)? {
-                let end = id_count + r.count();
-                for (place, id) in order.get_mut(id_count..end)?.iter_mut().zip(r.id()..) {
-                    *place = id;
-                }
-                id_count = end;
-                run.take_in(r);
-            }
-            *runs.get_mut(run_count)? = run;
-            run_count += 1;
+            runs.push(part.refs.get(at..at + length)?)?;
             at += length;
         }
     }
-    Some(run_count)
+    Some(())
 }
 
 /// A few refs that follow each other.
@@ -236,7 +251,9 @@ mod tests {
         let along = Along { refs, keys: along_curve(refs, &mut keys, &mut spare) };
         let (mut runs, mut order) = (refs.to_vec(), std::vec![0; count as usize]);
         let areas = Areas::new(&census.bounds);
-        let run_count = cut_into_runs(&along, source, areas, &mut runs, &mut order).expect("room");
+        let mut cut = Runs { runs: &mut runs, order: &mut order, count: 0, ids: 0 };
+        cut_into_runs(&along, source, areas, &mut cut).expect("room");
+        let run_count = cut.count;
         let runs: Vec<Vec<_>> = (runs[..run_count].iter())
             .map(|run| order[run.id() as usize..][..run.count()].to_vec())
             .collect();

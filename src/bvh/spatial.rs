@@ -266,6 +266,7 @@ mod tests {
             source: Some(Source { scene: &scene, geometries: &geometries, named: false }),
             blocks: None,
             leaf_max: 5,
+            apart: 0,
             mixed: false,
             depth: Depth::Deep,
             effort: Effort::BEST,

@@ -56,6 +56,8 @@ pub(crate) struct Limits<'s, 'a> {
     pub blocks: Option<Source<'s, 'a>>,
     /// Refs of a leaf at most; 2 to 6.
     pub leaf_max: usize,
+    /// So many refs at the front are parted from the others first of all.
+    pub apart: usize,
     /// Whether there are triangles and spheres: a leaf is of one kind.
     pub mixed: bool,
     /// How far refs that may be one leaf are parted.
@@ -232,6 +234,10 @@ impl Splitter<'_, '_, '_> {
             STEP_COST * area + work < area * count as f32 || area == 0.0
         };
         let lasts = |left_count: usize| self.lasts(task, [left_count, count - left_count]);
+        let apart = self.limits.apart;
+        if WIDE && task.depth == 0 && (1..count).contains(&apart) && lasts(apart) {
+            return Some(self.split_at(refs, apart, task.even));
+        }
         let sah = if count <= FEW {
             let sweep = sweep(refs, areas, lasts)
                 .filter(|s| !may_be_leaf || depth != Depth::Paying || pays(s.work));
@@ -377,8 +383,17 @@ pub(super) mod tests {
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
                 let effort = Effort::BALANCED;
                 let (source, blocks, even) = (None, None, None);
-                let limits =
-                    Limits { leaves, source, blocks, leaf_max, mixed: false, depth, effort, even };
+                let limits = Limits {
+                    leaves,
+                    source,
+                    blocks,
+                    leaf_max,
+                    apart: 0,
+                    mixed: false,
+                    depth,
+                    effort,
+                    even,
+                };
                 let caller = &Caller::new(None, None);
                 let used = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");
                 let levels = levels(&nodes[..used.nodes]);

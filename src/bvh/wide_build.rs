@@ -149,7 +149,7 @@ fn grow_tree(
     let (front, rest) = bytes.split_at_mut_checked(places.refs)?;
     let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
     let source = Source { scene, geometries, named: false };
-    let Plan { places, count, leaf_max, uneven, cut, in_runs } =
+    let Plan { places, count, apart, leaf_max, uneven, cut, in_runs } =
         Plan::new(census, places, how, source, rest)?;
     let (refs, tail) = rest.split_at_mut_checked(places.nodes - places.refs)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
@@ -161,6 +161,7 @@ fn grow_tree(
         source: cut.then_some(source),
         blocks: in_blocks.then_some(source),
         leaf_max,
+        apart,
         mixed: census.is_mixed(),
         depth: match uneven {
             Some(_) => Depth::Alike,
