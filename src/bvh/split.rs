@@ -2,6 +2,7 @@
 
 use super::refs::PrimRef;
 use crate::math::Aabb;
+use crate::simd::{self, Lanes, Width};
 
 /// A box with a fourth lane that means nothing: four lanes are one vector on most machines.
 #[derive(Clone, Copy)]
@@ -20,10 +21,12 @@ impl Box4 {
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline)]
     pub fn add(&mut self, other: &Box4) {
-        for k in 0..4 {
-            self.lower[k] = lesser(other.lower[k], self.lower[k]);
-            self.upper[k] = greater(other.upper[k], self.upper[k]);
-        }
+        // By instructions that are named: of plain comparisons compilers make stores of some lanes, where there are such, which are
+        // slow to read.
+        let s = simd::at_hand();
+        let (lower, upper) = (Width::<4>::load(s, &self.lower), Width::<4>::load(s, &self.upper));
+        Width::<4>::load(s, &other.lower).min(lower).store(&mut self.lower);
+        Width::<4>::load(s, &other.upper).max(upper).store(&mut self.upper);
     }
 
     /// The axis along which it is widest.

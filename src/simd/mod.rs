@@ -417,6 +417,12 @@ pub(crate) fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     unsafe { native::run_with(Backend::current(), kernel) }
 }
 
+/// The vectors that every processor has which this is compiled for: for code that is not compiled once for each backend.
+#[inline(always)]
+pub(crate) fn at_hand() -> impl Simd {
+    native::at_hand()
+}
+
 /// Lets the processor fetch `what`, if it can be told to.
 #[inline(always)]
 pub(crate) fn prefetch<T>(what: &T) {

@@ -16,6 +16,12 @@ pub(super) unsafe fn run_with<K: Kernel>(_backend: Backend, kernel: K) -> K::Out
     Scalar.run(kernel)
 }
 
+/// What every processor has that this is compiled for.
+#[inline(always)]
+pub(super) fn at_hand() -> impl Simd {
+    Scalar
+}
+
 /// Nothing.
 #[inline(always)]
 pub(super) fn prefetch<T>(_what: &T) {}

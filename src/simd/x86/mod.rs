@@ -33,6 +33,12 @@ pub(super) unsafe fn run_with<K: Kernel>(backend: Backend, kernel: K) -> K::Outp
     }
 }
 
+/// What every processor has that this is compiled for.
+#[inline(always)]
+pub(super) fn at_hand() -> impl Simd {
+    Sse2
+}
+
 /// Asks for each cache line of `what`.
 #[inline(always)]
 pub(super) fn prefetch<T>(what: &T) {
