@@ -2,7 +2,7 @@
 
 use super::refs::PrimRef;
 use super::split::{Areas, Box4, middle};
-use crate::simd::SMALL;
+use crate::simd::{self, Lanes, SMALL, Width};
 
 /// Bins along each axis at most.
 const BINS: usize = 32;
@@ -100,12 +100,15 @@ impl Binning {
     /// The bins on the three axes of a ref whose centre is in the box.
     #[inline(always)]
     fn bins_of(&self, r: &PrimRef) -> [usize; 3] {
-        let Box4 { lower, upper } = &r.bounds;
-        let mut at = [0; 4];
-        for k in 0..4 {
-            at[k] = self.place(middle(lower[k], upper[k]), k).to_bits();
-        }
-        let [x, y, z, _] = at.map(|bits| self.bin(bits));
+        let s = simd::at_hand();
+        let load = |lanes: &[f32; 4]| Width::<4>::load(s, lanes);
+        let quarter = Width::<4>::splat(s, 0.25);
+        let centre = load(&r.bounds.lower).mul(quarter).add(load(&r.bounds.upper).mul(quarter));
+        let place = centre.sub(load(&self.lower)).mul(load(&self.scale));
+        let place = place.sub(Width::<4>::splat(s, 0.5)).add(Width::<4>::splat(s, INTEGER));
+        let mut at = [0.0; 4];
+        place.min(Width::<4>::splat(s, f32::from_bits(self.last))).store(&mut at);
+        let [x, y, z, _] = at.map(|place| place.to_bits() as usize % BINS);
         [x, y, z]
     }
 
