@@ -6,7 +6,7 @@ use super::branch::grow;
 use super::budget::leaf_budget;
 use super::refs::{PrimRef, gather};
 use super::split::Areas;
-use super::spread::Spread;
+use super::spread::unevenness_of_all;
 use super::tree::{Depth, Grown, Limits};
 use crate::block::leaf::{SPHERES, TRIANGLES_AT_LEAST};
 use crate::block::{BvhNode, Census, Counts, KIND_BVH, LAYOUT_COMPACT, PartsMut};
@@ -101,7 +101,7 @@ fn grow_tree(
     let refs = storage::view_mut::<PrimRef>(rest, 0, plan.ref_count)?;
     gather(scene, census, 1, how.caller, refs);
     let mixed = census.is_mixed();
-    let unevenness = Spread::of(refs, Areas::new(&census.bounds), how.caller).unevenness();
+    let unevenness = unevenness_of_all(refs, Areas::new(&census.bounds), how.caller);
     let effort = how.effort.for_uneven(unevenness).unwrap_or(how.effort);
     let leaves = plan.leaves;
     let limits = Limits {
