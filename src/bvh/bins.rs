@@ -97,7 +97,8 @@ impl Binning {
         Binning { lower: centres.lower, scale, bins, last: INTEGER.to_bits() + bins as u32 - 1 }
     }
 
-    /// The bins on the three axes of a ref whose centre is in the box.
+    /// The bins on the three axes of a ref whose centre is in the box: by the operations of [`place`](Self::place), but clamped as floats, which
+    /// is one instruction where it is named.
     #[inline(always)]
     fn bins_of(&self, r: &PrimRef) -> [usize; 3] {
         let s = simd::at_hand();

@@ -320,6 +320,32 @@ mod tests {
     }
 
     #[test]
+    fn what_stands_apart_is_parted_first() {
+        let (count, leaf_max, depth) = (5_000, 4, Depth::Whole);
+        let refs = series(count, 1.001);
+        for apart in [0, 1, 3, 7] {
+            let limits = Limits {
+                leaves: count,
+                source: None,
+                blocks: None,
+                leaf_max,
+                apart,
+                mixed: false,
+                depth,
+                effort: Effort::BALANCED,
+                even: None,
+            };
+            let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * count];
+            let (mut grown, caller) = (refs.clone(), Caller::new(None, None));
+            grow(&mut nodes, &mut grown, count, &limits, &caller).expect("room");
+            let left = nodes[nodes[0].first as usize];
+            let mut around = Aabb::EMPTY;
+            refs[..apart].iter().for_each(|r| around.add(&r.bounds.aabb()));
+            assert_eq!(left.aabb() == around, apart > 0, "{apart}");
+        }
+    }
+
+    #[test]
     fn boxes_are_those_of_what_is_below() {
         let mut random = Random::new(3);
         let mut refs: Vec<_> = (0..20_000)
