@@ -61,7 +61,7 @@ struct Spread {
     cells: f64,
     /// The share of them that is near the next one.
     in_order: f64,
-    /// How unlike the areas of their boxes are, by a sample without the largest: 1 if they are all alike, about `n / k` if `k` of `n` have most of the area.
+    /// How unlike the areas of their boxes are, by a sample, without one that has most of it: 1 if they are all alike, about `n / k` if `k` of `n` have most of the area.
     unevenness: f64,
 }
 
@@ -73,8 +73,7 @@ impl Spread {
         let (all, taken) = (f64::from(census.hittable()), sample.count as f64);
         let share = all / taken;
         // A few that are much larger than all others stand apart in a BVH: if one of them is in the sample, it stands for no others.
-        let longest = f64::from(census.longest) * grid.per_longest;
-        let apart = if 2.0 * sample.largest > longest * longest { sample.largest } else { 0.0 };
+        let apart = if 2.0 * sample.largest > sample.areas { sample.largest } else { 0.0 };
         let areas = share * (sample.areas - apart);
         let squares = share * (sample.squares - apart * apart);
         Spread {
