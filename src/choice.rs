@@ -183,7 +183,7 @@ impl Sample {
         let distance = (count / (SAMPLES as u32 / 8 * 7)).max(SHARE).min(count / LEAST).max(1);
         Sample {
             most: 2 * distance - 1,
-            random: 0,
+            random: 1,
             cells: [0; SAMPLES],
             count: 0,
             per_cell: 0.0,
@@ -196,7 +196,8 @@ impl Sample {
 
     /// Looks at primitives, whether they can be hit or not: few cannot.
     fn take(&mut self, scene: &Scene, grid: &Grid) {
-        let mut left = 0;
+        // Not the first ones of all: scenes often begin with a floor.
+        let mut left = self.step() - 1;
         for mesh in (0..scene.mesh_count()).filter_map(|m| scene.mesh(m)) {
             left = self.take_from(grid, mesh.triangle_count(), left, |i| {
                 let [a, b, c] = mesh.triangle(i)?.map(wide);
@@ -225,10 +226,15 @@ impl Sample {
             if let Some(of_this) = corners(i) {
                 self.add(grid, of_this, corners(i + 1));
             }
-            self.random = self.random.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
-            i += 1 + (((self.random >> 32) * u64::from(self.most)) >> 32) as usize;
+            i += self.step();
         }
         i - count
+    }
+
+    /// How far it is to the next one.
+    fn step(&mut self) -> usize {
+        self.random = self.random.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(1);
+        1 + (((self.random >> 32) * u64::from(self.most)) >> 32) as usize
     }
 
     fn add(&mut self, grid: &Grid, [from, to]: Corners, next: Option<Corners>) {
