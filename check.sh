@@ -146,7 +146,7 @@ step_embree() {
 }
 
 # Rays that look for trouble, all answers judged exactly; Embree on the same rays.
-step_stress() { tool stress --rays 200000 --embree; }
+step_stress() { tool stress --rays 150000 --embree; }
 
 # The main job, cut short.
 step_compare() {
