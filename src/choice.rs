@@ -279,19 +279,36 @@ mod tests {
         let at = |place: u32| [place % 17, place / 17 % 17, place / 289].map(|k| k as f32);
         let spheres: Vec<_> =
             (0..20 * PLACES).map(|i| at(place(i))).map(|[x, y, z]| [x, y, z, 0.01]).collect();
+        spread_of(&spheres, Aabb { lower: [-0.01; 3], upper: [16.01; 3] })
+    }
+
+    fn spread_of(spheres: &[[f32; 4]], bounds: Aabb) -> Spread {
+        let count = spheres.len() as u32;
         let census = Census {
-            bounds: Aabb { lower: [-0.01; 3], upper: [16.01; 3] },
+            bounds,
             longest: 0.02,
             mesh_count: 0,
             triangle_limit: 0,
-            prim_limit: 20 * PLACES,
+            prim_limit: count,
             triangle_count: 0,
-            sphere_count: 20 * PLACES,
+            sphere_count: count,
             ignored_count: 0,
             is_index: false,
             refit: false,
         };
-        Spread::of(&Scene::new(&[], &[SphereSet::new(&spheres)]), &census)
+        Spread::of(&Scene::new(&[], &[SphereSet::new(spheres)]), &census)
+    }
+
+    /// Small spheres in a row, and a large one of that number.
+    #[test]
+    fn one_that_is_much_larger_makes_no_scene_uneven() {
+        for large in 0..40 {
+            let sphere = |i: u32| [i as f32, 0.0, 0.0, if i == large { 900.0 } else { 0.25 }];
+            let spheres: Vec<_> = (0..4_000).map(sphere).collect();
+            let bounds = Aabb { lower: [-900.0; 3], upper: [4_900.0; 3] };
+            let Spread { unevenness, .. } = spread_of(&spheres, bounds);
+            assert!((0.99..1.1).contains(&unevenness), "{large}: {unevenness}");
+        }
     }
 
     #[test]
