@@ -284,17 +284,7 @@ mod tests {
         let count = 20_000;
         let leaves = leaf_budget(count, false, 6, true);
         let effort = Effort::BALANCED;
-        let limits = Limits {
-            leaves,
-            source: None,
-            blocks: None,
-            leaf_max: 6,
-            apart: 0,
-            mixed: false,
-            depth: Depth::Paying,
-            effort,
-            even: None,
-        };
+        let limits = Limits::new(leaves, 6, Depth::Paying, effort);
         let (refs, caller) = (series(count, 1.001), Caller::new(None, None));
         let extent = Extent::around(&refs);
         let areas = Areas::new(&extent.bounds.aabb());
@@ -324,17 +314,8 @@ mod tests {
         let (count, leaf_max, depth) = (5_000, 4, Depth::Whole);
         let refs = series(count, 1.001);
         for apart in [0, 1, 3, 7] {
-            let limits = Limits {
-                leaves: count,
-                source: None,
-                blocks: None,
-                leaf_max,
-                apart,
-                mixed: false,
-                depth,
-                effort: Effort::BALANCED,
-                even: None,
-            };
+            let effort = Effort::BALANCED;
+            let limits = Limits { apart, ..Limits::new(count, leaf_max, depth, effort) };
             let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * count];
             let (mut grown, caller) = (refs.clone(), Caller::new(None, None));
             grow(&mut nodes, &mut grown, count, &limits, &caller).expect("room");
@@ -361,17 +342,7 @@ mod tests {
         // All choose planes of large nodes by samples, the last one of those that turn out to be even.
         for (effort, even) in [(fast, None), (balanced, None), (careful, Some(balanced))] {
             let (leaves, leaf_max, depth) = (count / 2, 4, Depth::Whole);
-            let limits = Limits {
-                leaves,
-                source: None,
-                blocks: None,
-                leaf_max,
-                apart: 0,
-                mixed: false,
-                depth,
-                effort,
-                even,
-            };
+            let limits = Limits { even, ..Limits::new(leaves, leaf_max, depth, effort) };
             let size = grow(&mut nodes, &mut refs, count, &limits, &Caller::new(None, None));
             assert_eq!(size.map(|size| size.refs), Some(count));
             let (mut pending, mut first) = (std::vec![0], 0);

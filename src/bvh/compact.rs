@@ -104,17 +104,7 @@ fn grow_tree(
     let unevenness = unevenness_of_all(refs, Areas::new(&census.bounds), how.caller);
     let effort = how.effort.for_uneven(unevenness).unwrap_or(how.effort);
     let leaves = plan.leaves;
-    let limits = Limits {
-        leaves,
-        source: None,
-        blocks: None,
-        leaf_max: LEAF_MAX,
-        apart: 0,
-        mixed,
-        depth: Depth::Paying,
-        effort,
-        even: None,
-    };
+    let limits = Limits { mixed, ..Limits::new(leaves, LEAF_MAX, Depth::Paying, effort) };
     let node_count = grow(nodes, refs, plan.ref_count, &limits, how.caller)?.nodes;
     // Triangles first, then spheres, each in the order of the leaves.
     let mut ids = prim_ids.iter_mut();

@@ -218,17 +218,7 @@ mod tests {
             })
             .collect();
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * LEAVES];
-        let limits = Limits {
-            leaves: LEAVES,
-            source: None,
-            leaf_max: 1,
-            apart: 0,
-            blocks: None,
-            mixed: false,
-            depth: Depth::Deep,
-            effort: Effort::BALANCED,
-            even: None,
-        };
+        let limits = Limits::new(LEAVES, 1, Depth::Deep, Effort::BALANCED);
         let caller = &Caller::new(None, None);
         let size = grow(&mut nodes, &mut refs, LEAVES, &limits, caller);
         assert_eq!(size.map(|size| size.nodes), Some(2 * LEAVES));

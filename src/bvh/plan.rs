@@ -58,12 +58,13 @@ impl Plan {
             gather_strips(source.scene, census, places.leaves, how, refs);
         let gathered = refs.get_mut(..count)?;
         let spread = Spread::of(gathered, areas, how.caller);
-        let mut uneven = how.effort.for_uneven(spread.unevenness());
-        let mut apart = 0;
-        if uneven.is_some() && !how.effort.cuts {
-            apart = spread.set_apart(gathered, &how.effort);
-            uneven = uneven.filter(|_| apart == 0);
-        }
+        let uneven = how.effort.for_uneven(spread.unevenness());
+        // Not at the best quality: what cuts and mends trees of uneven scenes is to do so.
+        let apart = match uneven {
+            Some(effort) if !effort.cuts => spread.set_apart(gathered, &how.effort),
+            _ => 0,
+        };
+        let uneven = uneven.filter(|_| apart == 0);
         let (prims, still) = (census.hittable(), census.sphere_count == 0 && !census.refit);
         let cut = uneven.is_some_and(|effort| effort.cuts) && still;
         if uneven.is_none() && how.effort.blocks && census.triangle_count == prims {

@@ -259,17 +259,7 @@ mod tests {
     fn tree(mut refs: Vec<PrimRef>, effort: Effort) -> (Vec<BvhNode>, Vec<u32>) {
         let count = refs.len();
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * count];
-        let limits = Limits {
-            leaves: count,
-            source: None,
-            blocks: None,
-            leaf_max: 5,
-            apart: 0,
-            mixed: false,
-            depth: Depth::Deep,
-            effort,
-            even: None,
-        };
+        let limits = Limits::new(count, 5, Depth::Deep, effort);
         let caller = &Caller::new(None, None);
         let size = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");
         nodes.truncate(size.nodes);

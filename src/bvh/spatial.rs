@@ -261,17 +261,8 @@ mod tests {
             (0..count).map(|i| PrimRef::new(i as u32, &shape(i).aabb(), false)).collect();
         slots.resize(count + count / 4, slots[0]);
         let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * count];
-        let limits = Limits {
-            leaves: count,
-            source: Some(Source { scene: &scene, geometries: &geometries, named: false }),
-            blocks: None,
-            leaf_max: 5,
-            apart: 0,
-            mixed: false,
-            depth: Depth::Deep,
-            effort: Effort::BEST,
-            even: None,
-        };
+        let source = Some(Source { scene: &scene, geometries: &geometries, named: false });
+        let limits = Limits { source, ..Limits::new(count, 5, Depth::Deep, Effort::BEST) };
         let caller = &Caller::new(None, None);
         let size = grow(&mut nodes, &mut slots, count, &limits, caller).expect("room");
         assert!(size.refs > count + 100, "{} of {} slots", size.refs, slots.len());

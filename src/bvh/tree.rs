@@ -68,6 +68,14 @@ pub(crate) struct Limits<'s, 'a> {
     pub even: Option<Effort>,
 }
 
+impl Limits<'_, '_> {
+    /// For refs of one kind, of which nothing else is known and none are cut.
+    pub fn new(leaves: usize, leaf_max: usize, depth: Depth, effort: Effort) -> Self {
+        let (source, blocks, apart, mixed, even) = (None, None, 0, false, None);
+        Limits { leaves, source, blocks, leaf_max, apart, mixed, depth, effort, even }
+    }
+}
+
 /// How far refs that may be one leaf are parted.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Depth {
@@ -382,18 +390,7 @@ pub(super) mod tests {
                 let mut refs = series(count, ratio);
                 let mut nodes = std::vec![BvhNode::inner(&Aabb::EMPTY, 0); 2 * leaves];
                 let effort = Effort::BALANCED;
-                let (source, blocks, even) = (None, None, None);
-                let limits = Limits {
-                    leaves,
-                    source,
-                    blocks,
-                    leaf_max,
-                    apart: 0,
-                    mixed: false,
-                    depth,
-                    effort,
-                    even,
-                };
+                let limits = Limits::new(leaves, leaf_max, depth, effort);
                 let caller = &Caller::new(None, None);
                 let used = grow(&mut nodes, &mut refs, count, &limits, caller).expect("room");
                 let levels = levels(&nodes[..used.nodes]);
