@@ -204,7 +204,7 @@ fn places<'r>(tasks: &[Task], slots: &'r mut [PrimRef]) -> impl Iterator<Item = 
 }
 
 /// The box around all refs, and around their centres.
-fn whole(refs: &[PrimRef], caller: &Caller) -> Option<Extent> {
+pub(super) fn whole(refs: &[PrimRef], caller: &Caller) -> Option<Extent> {
     if !THREADS {
         return Some(Extent::around(refs));
     }

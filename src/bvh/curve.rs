@@ -1,7 +1,9 @@
 //! Refs in the order of a curve that fills space: what is near on it is near in space.
 
+use super::branch::whole;
 use super::refs::PrimRef;
-use super::split::{Box4, Extent, centre, greater, lesser};
+use super::split::{Box4, centre, greater, lesser};
+use crate::caller::{Caller, PARTS};
 
 /// Cells along each axis, as a power of two: with the number of a ref these are 63 bits.
 const BITS: u32 = 11;
@@ -12,30 +14,73 @@ const DIGITS: usize = (3 * BITS / DIGIT) as usize;
 const NUMBER: u32 = 30;
 const _: () = assert!(DIGIT * DIGITS as u32 == 3 * BITS && 3 * BITS + NUMBER <= 64);
 
-/// Writes the refs in the order of their centres along the curve; those of one cell keep their order. `keys` and `spare`
-/// have room for as many words.
+/// Fewer refs are not shared out.
+const LEAST: usize = 4096;
+
+/// Writes the refs in the order of their centres along the curve: those of one cell keep their order, and the first `apart` stay
+/// in front whatever their centres. `keys` and `spare` have room for as many words, of which one is returned.
 ///
-/// Source: \[Lauterbach09\], with cells that are cubes.
+/// Each thread sorts a part, then two and two are merged until there is one: the keys differ, so it does not matter how they
+/// came into their order.
+///
+/// Source: \[Lauterbach09\], with cells that are cubes; merging by parts after \[Green12\].
 pub(super) fn along_curve<'k>(
     refs: &[PrimRef],
-    keys: &'k mut [u64],
-    spare: &'k mut [u64],
-) -> &'k [u64] {
-    let mut counts = [[0u32; 1 << DIGIT]; DIGITS];
-    let cells = Cells::new(&Extent::around(refs).centres);
-    for ((key, r), number) in keys.iter_mut().zip(refs).zip(0..) {
-        let place = cells.place(r);
-        *key = place << NUMBER | number;
-        for (counts, digit) in counts.iter_mut().zip(0..) {
-            counts[digit_of(*key, digit)] += 1;
+    apart: usize,
+    (keys, spare): (&'k mut [u64], &'k mut [u64]),
+    caller: &Caller,
+) -> Option<&'k mut [u64]> {
+    let cells = Cells::new(&whole(refs.get(apart..)?, caller)?.centres);
+    let size = refs.len().div_ceil(caller.worker_count()).max(LEAST);
+    let mut parts = [const { None }; PARTS];
+    let places = refs.chunks(size).zip(keys.chunks_mut(size)).zip(spare.chunks_mut(size));
+    for (i, (part, ((refs, keys), spare))) in parts.iter_mut().zip(places).enumerate() {
+        *part = Some((i * size, refs, keys, spare));
+    }
+    caller.for_each(&mut parts, |part| {
+        let Some((first, refs, keys, spare)) = part else { return };
+        for ((key, r), number) in keys.iter_mut().zip(*refs).zip(*first..) {
+            let place = if number < apart { 0 } else { cells.place(r) };
+            *key = place << NUMBER | number as u64;
         }
-    }
-    let (mut from, mut to) = (keys, spare);
-    for (counts, digit) in counts.iter_mut().zip(0..) {
-        sort_by_digit(from, to, counts, digit);
+        sort(keys, spare);
+    });
+    let (mut from, mut to, mut width) = (spare, keys, size);
+    while width < refs.len() {
+        let mut parts = [const { None }; PARTS];
+        for (i, (part, to)) in parts.iter_mut().zip(to.chunks_mut(size)).enumerate() {
+            let (at, pair) =
+                (i * size % (2 * width), from.get(i * size / (2 * width) * 2 * width..)?);
+            let (left, right) = pair.split_at(width.min(pair.len()));
+            *part = Some((left, right.get(..width).unwrap_or(right), at, to));
+        }
+        caller.for_each(&mut parts, |part| {
+            if let Some((left, right, at, to)) = part {
+                merge(left, right, *at, to);
+            }
+        });
         (from, to) = (to, from);
+        width *= 2;
     }
-    from
+    Some(from)
+}
+
+/// Writes what begins at place `at` of both together; each is sorted, and all differ.
+fn merge(left: &[u64], right: &[u64], at: usize, to: &mut [u64]) {
+    // How many are from the left before that place: as few as leave none there that belong before one from the right.
+    let (mut i, mut end) = (at.saturating_sub(right.len()), at.min(left.len()));
+    while i < end {
+        let middle = i.midpoint(end);
+        if left[middle] < right[at - middle - 1] { i = middle + 1 } else { end = middle }
+    }
+    let mut j = at - i;
+    for to in to {
+        let next = |keys: &[u64], i: usize| keys.get(i).copied().unwrap_or(u64::MAX);
+        let (one, other) = (next(left, i), next(right, j));
+        *to = one.min(other);
+        i += usize::from(one < other);
+        j += usize::from(one >= other);
+    }
 }
 
 /// The number of the ref that has this key.
@@ -48,6 +93,22 @@ pub(super) fn number_of(key: u64) -> usize {
 fn digit_of(key: u64, digit: u32) -> usize {
     (key >> (NUMBER + DIGIT * digit)) as usize % (1 << DIGIT)
 }
+
+/// Sorts keys, which go to `to` in the end.
+fn sort(keys: &mut [u64], to: &mut [u64]) {
+    let mut counts = [[0u32; 1 << DIGIT]; DIGITS];
+    for key in keys.iter() {
+        for (counts, digit) in counts.iter_mut().zip(0..) {
+            counts[digit_of(*key, digit)] += 1;
+        }
+    }
+    let (mut from, mut to) = (keys, to);
+    for (counts, digit) in counts.iter_mut().zip(0..) {
+        sort_by_digit(from, to, counts, digit);
+        (from, to) = (to, from);
+    }
+}
+const _: () = assert!(DIGITS % 2 == 1);
 
 /// One pass of a radix sort, from the lowest digit on; `counts` is how often each value occurs.
 fn sort_by_digit(from: &[u64], to: &mut [u64], counts: &mut [u32; 1 << DIGIT], digit: u32) {
@@ -106,17 +167,56 @@ fn spread(bits: u64) -> u64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use crate::caller::Threads;
     use crate::math::Aabb;
+    use raykern_harness::make::Random;
     use std::vec::Vec;
 
     /// The numbers of points in the order of the curve.
     fn order(points: &[[f32; 3]]) -> Vec<usize> {
+        sorted(points, 0, &Caller::new(None, None))
+    }
+
+    fn sorted(points: &[[f32; 3]], apart: usize, caller: &Caller) -> Vec<usize> {
         let point = |p: &[f32; 3]| PrimRef::new(0, &Aabb { lower: *p, upper: *p }, false);
         let refs: Vec<_> = points.iter().map(point).collect();
         let (mut keys, mut spare) = (std::vec![0; refs.len()], std::vec![0; refs.len()]);
-        along_curve(&refs, &mut keys, &mut spare).iter().map(|key| number_of(*key)).collect()
+        let keys = along_curve(&refs, apart, (&mut keys, &mut spare), caller).expect("a curve");
+        keys.iter().map(|key| number_of(*key)).collect()
+    }
+
+    /// So many tasks at once, one after the other.
+    pub(in crate::bvh) struct Tasks(pub usize);
+
+    impl Threads for Tasks {
+        fn worker_count(&self) -> usize {
+            self.0
+        }
+
+        fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+            (0..count).rev().for_each(task);
+        }
+    }
+
+    #[test]
+    fn parts_that_are_merged_are_as_if_sorted_at_once() {
+        let mut random = Random::new(5);
+        // Many have a cell in common.
+        let mut point = || random.point(0.0, 1.0).map(|x| (64.0 * x) as u8 as f32);
+        for count in [LEAST - 1, LEAST, 2 * LEAST + 1, 50_001] {
+            let points: Vec<_> = (0..count).map(|_| point()).collect();
+            let alone = order(&points);
+            for workers in [2, 3, 5, 8, 64, 100] {
+                let (tasks, caller) = (Tasks(workers), |tasks| Caller::new(Some(tasks), None));
+                assert!(sorted(&points, 0, &caller(&tasks)) == alone, "{count} {workers}");
+                let apart = sorted(&points, 7, &caller(&tasks));
+                assert!(apart[..7] == [0, 1, 2, 3, 4, 5, 6], "{count} {workers}");
+                let others = alone.iter().filter(|number| **number >= 7);
+                assert!(apart[7..].iter().eq(others), "{count} {workers}");
+            }
+        }
     }
 
     #[test]

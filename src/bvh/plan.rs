@@ -69,7 +69,7 @@ impl Plan {
         let cut = uneven.is_some_and(|effort| effort.cuts) && still;
         if uneven.is_none() && how.effort.blocks && census.triangle_count == prims {
             let refs = (count, apart, prims as usize);
-            if let Some(places) = put_into_runs(refs, &places, source, areas, bytes) {
+            if let Some(places) = put_into_runs(refs, &places, (source, areas), how.caller, bytes) {
                 let count = places.room;
                 return Some(Plan {
                     places,

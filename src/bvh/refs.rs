@@ -61,6 +61,13 @@ impl PrimRef {
         PrimRef { bounds }
     }
 
+    /// The same of primitives whose ids are so much higher.
+    pub fn moved(mut self, by: usize) -> PrimRef {
+        let id = self.id() + by as u32;
+        self.bounds.lower[3] = f32::from_bits(id | Self::NORMAL);
+        self
+    }
+
     pub fn id(&self) -> u32 {
         self.bounds.lower[3].to_bits() & !Self::NORMAL
     }

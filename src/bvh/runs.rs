@@ -7,6 +7,7 @@ use super::places::Places;
 use super::refs::PrimRef;
 use super::split::{Areas, greater};
 use crate::block::leaf::{TRIANGLES, TriangleBlock};
+use crate::caller::{Caller, PARTS};
 use crate::prim::{Shapes, Source};
 use crate::simd::prefetch;
 use crate::storage;
@@ -25,38 +26,31 @@ const FINISHED: usize = size_of::<TriangleBlock>() + 42;
 pub(super) fn put_into_runs(
     (count, apart, prims): (usize, usize, usize),
     places: &Places,
-    source: Source,
-    areas: Areas,
+    (source, areas): (Source, Areas),
+    caller: &Caller,
     bytes: &mut [u8],
 ) -> Option<Places> {
     const REF: usize = size_of::<PrimRef>();
     const KEYS: usize = 2 * size_of::<u64>();
-    let (refs, rest) = bytes.split_at_mut_checked(REF * count)?;
-    let (keys, rest) = rest.split_at_mut_checked(KEYS * count)?;
-    let (runs, order) = rest.split_at_mut_checked(REF * count)?;
-    let refs = storage::view::<PrimRef>(refs, 0, count).filter(|refs| refs.len() >= FROM)?;
-    let (keys, spare) = storage::view_mut::<u64>(keys, 0, 2 * count)?.split_at_mut(count);
-    let (large, refs) = refs.split_at_checked(apart)?;
-    let (keys, spare) = (keys.get_mut(apart..)?, spare.get_mut(apart..)?);
-    let along = Along { refs, keys: along_curve(refs, keys, spare) };
-    let runs = storage::view_mut::<PrimRef>(runs, 0, count)?;
-    let order = storage::view_mut::<u32>(order, 0, prims)?;
-    let mut runs = Runs { runs, order, count: 0, ids: 0 };
-    for one in large.chunks(1) {
-        runs.push(one)?;
-    }
-    cut_into_runs(&along, source, areas, &mut runs)?;
-    let run_count = runs.count;
     let size = places.refs + bytes.len();
+    let (front, back) = bytes.split_at_mut_checked((REF + KEYS) * count)?;
+    let (refs, keys) = front.split_at_mut_checked(REF * count)?;
+    let runs = storage::view_mut::<PrimRef>(back, 0, count)?;
+    let keys = storage::view_mut::<u64>(keys, 0, 2 * count)?.split_at_mut(count);
+    let along = storage::view::<PrimRef>(refs, 0, count).filter(|refs| refs.len() >= FROM)?;
+    let words = along_curve(along, apart, keys, caller)?;
+    let cutting = Cutting { refs: along, apart, source, areas };
+    let pieces = cutting.cut(words, storage::view_mut(back, 0, count)?, caller);
+    let run_count = pieces.cut.iter().map(|cut| cut.runs).sum();
     let places = places.fitting(run_count, run_count, size)?;
-    let place = (places.nodes - places.refs).checked_sub(2 * size_of::<u32>() * prims)?;
-    let end = REF * run_count;
-    if place < end || run_count * FINISHED + size_of::<u32>() * prims > bytes.len() {
+    let order = (places.nodes - places.refs).checked_sub(2 * size_of::<u32>() * prims)?;
+    let order = order.checked_sub((REF + KEYS) * count)?;
+    if run_count * FINISHED + size_of::<u32>() * prims > size - places.refs {
         return None;
     }
-    let (at_runs, at_order) = ((REF + KEYS) * count, (2 * REF + KEYS) * count);
-    bytes.copy_within(at_runs..at_runs + end, 0);
-    bytes.copy_within(at_order..at_order + size_of::<u32>() * prims, place);
+    let to = storage::view_mut(refs, 0, run_count)?;
+    pieces.bring_together(storage::view(back, 0, count)?, to, caller)?;
+    pieces.name_in_order(words, storage::view_mut(back, order, prims)?, caller)?;
     Some(places)
 }
 
@@ -72,6 +66,8 @@ pub(super) fn name_ids(ids: &mut [u32], free: &[u8]) -> Option<()> {
 
 /// Runs end with every so many refs.
 const PART: usize = 512;
+/// With every so many, nothing is known of the ones before: what is shared out are multiples of these.
+const PIECE: usize = 8 * PART;
 
 /// Refs, and the vertices of refs, are fetched so far ahead.
 const AHEAD: usize = 16;
@@ -79,54 +75,123 @@ const AHEAD: usize = 16;
 /// What a run costs beside the area of its box, in areas of its largest ref: the lane in a bundle, and its bytes.
 const PRICE: f32 = 2.0;
 
-/// Refs in some order, which is to be cut into runs.
-struct Along<'r> {
+/// What is cut, and how.
+struct Cutting<'r, 's, 'a> {
     refs: &'r [PrimRef],
-    /// Of which the lowest bits are [numbers](number_of) of refs.
-    keys: &'r [u64],
+    /// Each of so many, which come first, is a run of its own.
+    apart: usize,
+    source: Source<'s, 'a>,
+    areas: Areas,
 }
 
-/// Runs, and the ids of their primitives: the id of a run is where these begin.
-struct Runs<'r> {
-    runs: &'r mut [PrimRef],
-    order: &'r mut [u32],
-    count: usize,
-    ids: usize,
-}
-
-impl Runs<'_> {
-    /// Adds a run of these refs.
-    fn push(&mut self, refs: &[PrimRef]) -> Option<()> {
-        let mut run = PrimRef::run(self.ids);
-        for r in refs {
-            let end = self.ids + r.count();
-            for (place, id) in self.order.get_mut(self.ids..end)?.iter_mut().zip(r.id()..) {
-                *place = id;
-            }
-            self.ids = end;
-            run.take_in(r);
+impl Cutting<'_, '_, '_> {
+    /// Cuts refs, whose order is that of the [keys](number_of), into runs; each piece into the front of its part of `runs`, with
+    /// primitives that count from its first one. The keys are replaced by first ids and counts of the refs.
+    fn cut(&self, keys: &mut [u64], runs: &mut [PrimRef], caller: &Caller) -> Pieces {
+        let size = caller.part_size(keys.len(), PIECE);
+        let mut parts = [const { None }; PARTS];
+        let mut pieces = Pieces { size, cut: [Cut::default(); PARTS] };
+        let places = keys.chunks_mut(size).zip(runs.chunks_mut(size));
+        for (part, (i, (place, cut))) in
+            parts.iter_mut().zip(places.zip(&mut pieces.cut).enumerate())
+        {
+            *part = Some((i * size, place, cut));
         }
-        *self.runs.get_mut(self.count)? = run;
-        self.count += 1;
+        caller.for_each(&mut parts, |part| {
+            if let Some((first, (keys, runs), cut)) = part {
+                **cut = self.cut_piece(*first, keys, runs);
+            }
+        });
+        pieces
+    }
+
+    /// Cuts the refs from place `first` of the order on.
+    fn cut_piece(&self, first: usize, keys: &mut [u64], runs: &mut [PrimRef]) -> Cut {
+        let (mut shapes, mut seen) = (self.source.shapes(), Seen::NOTHING);
+        let mut part = Part { refs: [PrimRef::NONE; PART], fresh: [0; PART], count: 0 };
+        let mut cut = Cut::default();
+        for start in (0..keys.len()).step_by(PART) {
+            if start % PIECE == 0 {
+                seen = Seen::NOTHING;
+            }
+            part.read(self.refs, keys.get_mut(start..).unwrap_or_default(), &mut shapes, &mut seen);
+            let mut at = 0;
+            while at < part.count {
+                let alone = first + start + at < self.apart;
+                let length = if alone { 1 } else { part.length(at, self.areas) };
+                cut.push(part.refs.get(at..at + length).unwrap_or_default(), runs);
+                at += length;
+            }
+        }
+        cut
+    }
+}
+
+/// How many runs a piece became, and how many primitives these have.
+#[derive(Clone, Copy, Default)]
+struct Cut {
+    runs: usize,
+    prims: usize,
+}
+
+impl Cut {
+    /// Adds a run of these refs.
+    fn push(&mut self, refs: &[PrimRef], runs: &mut [PrimRef]) {
+        let mut run = PrimRef::run(self.prims);
+        refs.iter().for_each(|r| run.take_in(r));
+        self.prims += run.count();
+        if let Some(place) = runs.get_mut(self.runs) {
+            *place = run;
+            self.runs += 1;
+        }
+    }
+}
+
+/// What pieces of `size` refs were cut into.
+struct Pieces {
+    size: usize,
+    cut: [Cut; PARTS],
+}
+
+impl Pieces {
+    /// Moves the runs of all pieces together, with primitives that count from the first of all.
+    fn bring_together(&self, runs: &[PrimRef], to: &mut [PrimRef], caller: &Caller) -> Option<()> {
+        let mut parts = [const { None }; PARTS];
+        let (mut free, mut prims) = (to, 0);
+        for (part, (cut, runs)) in parts.iter_mut().zip(self.cut.iter().zip(runs.chunks(self.size)))
+        {
+            let (to, rest) = core::mem::take(&mut free).split_at_mut_checked(cut.runs)?;
+            *part = Some((runs, to, prims));
+            (free, prims) = (rest, prims + cut.prims);
+        }
+        caller.for_each(&mut parts, |part| {
+            let Some((runs, to, prims)) = part else { return };
+            to.iter_mut().zip(*runs).for_each(|(to, run)| *to = run.moved(*prims));
+        });
         Some(())
     }
-}
 
-/// Writes runs of refs that follow each other.
-fn cut_into_runs(along: &Along, source: Source, areas: Areas, runs: &mut Runs) -> Option<()> {
-    let mut shapes = source.shapes();
-    let mut seen = Seen::NOTHING;
-    let mut part = Part { refs: [PrimRef::NONE; PART], fresh: [0; PART], count: 0 };
-    for first in (0..along.keys.len()).step_by(PART) {
-        part.read(along, first, &mut shapes, &mut seen);
-        let mut at = 0;
-        while at < part.count {
-            let length = part.length(at, areas);
-            runs.push(part.refs.get(at..at + length)?)?;
-            at += length;
+    /// Writes the ids of all primitives in the order of the runs.
+    fn name_in_order(&self, words: &[u64], to: &mut [u32], caller: &Caller) -> Option<()> {
+        let mut parts = [const { None }; PARTS];
+        let mut free = to;
+        for (part, (cut, words)) in
+            parts.iter_mut().zip(self.cut.iter().zip(words.chunks(self.size)))
+        {
+            let (to, rest) = core::mem::take(&mut free).split_at_mut_checked(cut.prims)?;
+            *part = Some((words, to));
+            free = rest;
         }
+        caller.for_each(&mut parts, |part| {
+            let Some((words, to)) = part else { return };
+            let mut places = to.iter_mut();
+            for word in *words {
+                let (first, count) = (*word as u32, (*word >> 32) as usize);
+                (first..).zip(places.by_ref().take(count)).for_each(|(id, place)| *place = id);
+            }
+        });
+        Some(())
     }
-    Some(())
 }
 
 /// A few refs that follow each other.
@@ -141,21 +206,21 @@ struct Part {
 const ONES: u64 = 0x1111_1111_1111_1111;
 
 impl Part {
-    fn read(&mut self, along: &Along, first: usize, shapes: &mut Shapes, seen: &mut Seen) {
-        let keys = along.keys.get(first..).unwrap_or_default();
+    /// Reads the refs of the first keys, which are replaced by their first ids and counts.
+    fn read(&mut self, refs: &[PrimRef], keys: &mut [u64], shapes: &mut Shapes, seen: &mut Seen) {
         self.count = keys.len().min(PART);
-        let of = |key: &u64| along.refs.get(number_of(*key));
-        let places = self.refs.iter_mut().zip(&mut self.fresh);
-        for (i, (key, (place, fresh))) in keys.iter().zip(places).enumerate() {
+        for i in 0..self.count {
+            let of = |key: &u64| refs.get(number_of(*key));
             if let Some(r) = keys.get(i + 2 * AHEAD).and_then(of) {
                 prefetch(r);
             }
             if let Some(r) = keys.get(i + AHEAD).and_then(of) {
                 shapes.prefetch(r.id());
             }
-            let Some(r) = of(key) else { continue };
-            *place = *r;
-            *fresh = seen.fresh(r, shapes, first + i);
+            let Some(r) = of(&keys[i]) else { continue };
+            self.refs[i % PART] = *r;
+            self.fresh[i % PART] = seen.fresh(r, shapes);
+            keys[i] = (r.count() as u64) << 32 | u64::from(r.id());
         }
     }
 
@@ -186,14 +251,17 @@ impl Part {
 /// Where vertices were seen last: a table by their numbers, that forgets.
 struct Seen {
     vertices: [(u64, usize); 512],
+    /// Refs so far.
+    count: usize,
 }
 
 impl Seen {
-    const NOTHING: Seen = Seen { vertices: [(u64::MAX, 0); 512] };
+    const NOTHING: Seen = Seen { vertices: [(u64::MAX, 0); 512], count: 0 };
 
-    /// How many vertices of the ref at this place the refs before it do not have, as [`Part::fresh`] has it.
-    fn fresh(&mut self, r: &PrimRef, shapes: &mut Shapes, place: usize) -> u64 {
-        let mut fresh = 0;
+    /// How many vertices of the next ref the ones before it do not have, as [`Part::fresh`] has it.
+    fn fresh(&mut self, r: &PrimRef, shapes: &mut Shapes) -> u64 {
+        let (mut fresh, place) = (0, self.count);
+        self.count += 1;
         for id in (r.id()..).take(r.count()) {
             let Some((mesh, numbers)) = shapes.numbers(id) else {
                 // A strip has two vertices more than triangles.
@@ -215,16 +283,16 @@ impl Seen {
 mod tests {
     use super::*;
     use crate::block::Census;
+    use crate::bvh::curve::tests::Tasks;
     use crate::bvh::refs::gather;
-    use crate::caller::Caller;
     use crate::prim::{Packer, geometry_table, survey};
     use crate::scene::{Mesh, Scene};
     use std::vec::Vec;
 
     /// A sheet of triangles in an order without sense, its runs as lists of triangles, and how many triangles fit into blocks
     /// if each run is one.
-    fn runs_of(strip: usize, indexed: bool) -> Vec<Vec<u32>> {
-        const SIDE: u32 = 60;
+    fn runs_of(strip: usize, indexed: bool, apart: usize, caller: &Caller) -> Vec<Vec<u32>> {
+        const SIDE: u32 = 90;
         let vertices: Vec<_> = (0..(SIDE + 1) * (SIDE + 1))
             .map(|i| [i % (SIDE + 1), i / (SIDE + 1), i % 3].map(|x| x as f32))
             .collect();
@@ -240,21 +308,23 @@ mod tests {
         let soup: Vec<_> = indices.iter().map(|t| t.map(|v| vertices[v as usize])).collect();
         let mesh = if indexed { Mesh::indexed(&vertices, &indices) } else { Mesh::soup(&soup) };
         let meshes = [mesh];
-        let (scene, caller) = (Scene::new(&meshes, &[]), Caller::new(None, None));
-        let census = Census::take(&scene, &survey(&scene).unwrap(), &caller).unwrap();
+        let scene = Scene::new(&meshes, &[]);
+        let census = Census::take(&scene, &survey(&scene).unwrap(), caller).unwrap();
         let geometries: Vec<_> = geometry_table(&scene).collect();
         let source = Source { scene: &scene, geometries: &geometries, named: false };
         let mut refs = std::vec![PrimRef::NONE; count as usize];
-        let found = gather(&scene, &census, strip, &caller, &mut refs);
+        let found = gather(&scene, &census, strip, caller, &mut refs);
         let refs = &refs[..found];
         let (mut keys, mut spare) = (std::vec![0; found], std::vec![0; found]);
-        let along = Along { refs, keys: along_curve(refs, &mut keys, &mut spare) };
-        let (mut runs, mut order) = (refs.to_vec(), std::vec![0; count as usize]);
+        let keys = along_curve(refs, apart, (&mut keys, &mut spare), caller).expect("a curve");
+        let (mut runs, mut together) = (refs.to_vec(), refs.to_vec());
+        let mut order = std::vec![0; count as usize];
         let areas = Areas::new(&census.bounds);
-        let mut cut = Runs { runs: &mut runs, order: &mut order, count: 0, ids: 0 };
-        cut_into_runs(&along, source, areas, &mut cut).expect("room");
-        let run_count = cut.count;
-        let runs: Vec<Vec<_>> = (runs[..run_count].iter())
+        let pieces = Cutting { refs, apart, source, areas }.cut(keys, &mut runs, caller);
+        let run_count = pieces.cut.iter().map(|cut| cut.runs).sum();
+        pieces.bring_together(&runs, &mut together[..run_count], caller).expect("room");
+        pieces.name_in_order(keys, &mut order, caller).expect("room");
+        let runs: Vec<Vec<_>> = (together[..run_count].iter())
             .map(|run| order[run.id() as usize..][..run.count()].to_vec())
             .collect();
         let mut blocks = std::vec![TriangleBlock::EMPTY; run_count];
@@ -270,13 +340,27 @@ mod tests {
 
     #[test]
     fn each_run_fits_into_a_block_and_each_triangle_is_in_one() {
+        let alone = Caller::new(None, None);
         for (strip, indexed, fewest) in [(1, true, 8.0), (4, true, 8.0), (1, false, 4.5)] {
-            let runs = runs_of(strip, indexed);
+            let runs = runs_of(strip, indexed, 0, &alone);
             let mut all = runs.concat();
             let mean = all.len() as f32 / runs.len() as f32;
             assert!(mean > fewest, "{strip} {indexed}: {mean} a run");
             all.sort_unstable();
             assert!(all.iter().copied().eq(0..all.len() as u32), "{strip} {indexed}");
+        }
+    }
+
+    #[test]
+    fn pieces_are_cut_alike_by_all_threads_and_what_stands_apart_is_alone() {
+        for apart in [0, 3] {
+            let alone = runs_of(1, true, apart, &Caller::new(None, None));
+            for workers in [2, 3, 40] {
+                let tasks = Tasks(workers);
+                let shared = runs_of(1, true, apart, &Caller::new(Some(&tasks), None));
+                assert!(shared == alone, "{apart} {workers}");
+            }
+            assert!(alone[..apart].iter().zip(0..).all(|(run, id)| *run == [id]));
         }
     }
 }
