@@ -118,7 +118,7 @@ impl Splitter<'_, '_, '_> {
 /// Branches at most. How many there are must not depend on the threads, as the tree must not.
 const BRANCHES: usize = 64;
 /// Branches of fewer refs are not parted further.
-const BRANCH: usize = 2048;
+const BRANCH: usize = 256;
 
 /// A subtree of its own, with its places.
 pub(super) struct Branch<'b> {

@@ -1,23 +1,20 @@
 //! Writes bundles and the ids of leaf blocks from what the collapse chose.
+//!
+//! The bundles below one follow each other, and so do their leaf blocks and ids. Those below each child of the root's children are
+//! a part that is counted and written by itself, so that threads can share them.
+//!
+//! ```text
+//! root | its children a b | children of a | below the first, the second .. of these | children of b | below ..
+//! ```
 
 use super::MAX_DEPTH;
-use super::collapse::choice_of;
-use super::tree::Grown;
-use crate::block::BvhNode;
+use super::lanes::{Chosen, Lane, Lanes};
 use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::leaf::{KIND_SPHERES, KIND_TRIANGLES};
+use crate::caller::Caller;
 
 /// Marks, among the ids, the first one of a leaf block until the blocks are packed.
 pub(crate) const BEGINS: u32 = 1 << 31;
-
-/// The binary tree and what becomes of it.
-#[derive(Clone, Copy)]
-pub(crate) struct Chosen<'a> {
-    pub nodes: &'a [BvhNode],
-    pub choices: &'a [u64],
-    /// The ids in the order of the tree's leaves.
-    pub ids: &'a [u32],
-}
 
 /// How much there will be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,30 +24,120 @@ pub(crate) struct Sizes {
     pub sphere_blocks: u32,
 }
 
-/// A lane of a bundle: a node, and whether all below it is one leaf block.
+/// Parts at most: sixteen children of sixteen children.
+const MOST: usize = 256;
+
+/// How much there will be, of each part and of all.
+pub(crate) struct Outline {
+    pub sizes: Sizes,
+    parts: [Part; MOST],
+}
+
+/// How much there will be of a bundle and all below.
 #[derive(Clone, Copy, Default)]
-struct Lane {
+struct Part {
+    /// Without the one.
+    bundles: u32,
+    /// Of triangles and of spheres.
+    blocks: [u32; 2],
+    ids: [usize; 2],
+}
+
+impl Part {
+    /// Counts the children of a bundle.
+    fn add<const W: usize>(&mut self, chosen: &Chosen, lanes: &Lanes<W>) -> Option<()> {
+        self.bundles += lanes.inner().len() as u32;
+        for lane in lanes.all().iter().filter(|lane| lane.is_leaf) {
+            let content = chosen.content(lane.node)?;
+            let kind = usize::from(content.is_sphere);
+            self.blocks[kind] += 1;
+            self.ids[kind] += content.end - content.first;
+        }
+        Some(())
+    }
+}
+
+/// Where the ids of leaf blocks go, and the number of the next block: of triangles and of spheres.
+#[derive(Default)]
+struct Blocks<'i> {
+    ids: [&'i mut [u32]; 2],
+    next: [u32; 2],
+}
+
+impl<'i> Blocks<'i> {
+    /// What a part takes from the front.
+    fn of(&mut self, part: &Part) -> Option<Blocks<'i>> {
+        let mut blocks = Blocks::default();
+        for kind in 0..2 {
+            let free = core::mem::take(&mut self.ids[kind]);
+            (blocks.ids[kind], self.ids[kind]) = free.split_at_mut_checked(part.ids[kind])?;
+            blocks.next[kind] = self.next[kind];
+            self.next[kind] += part.blocks[kind];
+        }
+        Some(blocks)
+    }
+
+    /// Adds a block of these ids, the first of which is [marked](BEGINS).
+    fn push(&mut self, kind: usize, ids: &[u32]) -> Option<ChildRef> {
+        let free = core::mem::take(&mut self.ids[kind]);
+        let (own, rest) = free.split_at_mut_checked(ids.len())?;
+        own.copy_from_slice(ids);
+        *own.first_mut()? |= BEGINS;
+        self.ids[kind] = rest;
+        let number = self.next[kind];
+        self.next[kind] += 1;
+        Some(ChildRef::leaf([KIND_TRIANGLES, KIND_SPHERES][kind], number))
+    }
+}
+
+/// The bundles of a part, and what they need.
+struct Job<'b, const W: usize> {
     node: u32,
-    is_leaf: bool,
+    /// The bundle of that node, and those below it.
+    bundle: &'b mut Bundle<W>,
+    below: &'b mut [Bundle<W>],
+    /// The number of the first one below.
+    first: u32,
+    blocks: Blocks<'b>,
+    written: Option<()>,
 }
 
 impl Chosen<'_> {
     /// Counts the parts of the tree of bundles.
-    pub fn sizes<const W: usize>(&self) -> Option<Sizes> {
-        let mut sizes = Sizes { bundles: 1, ..Sizes::default() };
-        self.for_each_bundle::<W>(|_, lanes| {
-            for lane in lanes {
-                if !lane.is_leaf {
-                    sizes.bundles += 1;
-                } else if self.content(lane.node)?.is_sphere {
-                    sizes.sphere_blocks += 1;
-                } else {
-                    sizes.triangle_blocks += 1;
-                }
+    pub fn outline<const W: usize>(&self, caller: &Caller) -> Option<Outline> {
+        let (mut top, mut jobs) = (Part { bundles: 1, ..Part::default() }, [None; MOST]);
+        let mut places = jobs.iter_mut();
+        let root = self.lanes_of::<W>(0)?;
+        top.add(self, &root)?;
+        for node in root.inner() {
+            let lanes = self.lanes_of::<W>(node)?;
+            top.add(self, &lanes)?;
+            for node in lanes.inner() {
+                *places.next()? = Some((node, None));
             }
-            Some(())
-        })?;
-        Some(sizes)
+        }
+        caller.for_each(&mut jobs, |job| {
+            if let Some((node, part)) = job {
+                let mut counted = Part::default();
+                let done =
+                    self.for_each_from::<W>((*node, 0), 0, |_, lanes| counted.add(self, lanes));
+                *part = done.map(|()| counted);
+            }
+        });
+        let mut sizes = Sizes::default();
+        let mut add = |part: &Part| {
+            let Part { bundles, blocks: [triangles, spheres], .. } = *part;
+            sizes.bundles += bundles;
+            sizes.triangle_blocks += triangles;
+            sizes.sphere_blocks += spheres;
+        };
+        add(&top);
+        let mut parts = [Part::default(); MOST];
+        for (part, (_, counted)) in parts.iter_mut().zip(jobs.iter().flatten()) {
+            *part = (*counted)?;
+            add(part);
+        }
+        Some(Outline { sizes, parts })
     }
 
     /// Writes the bundles, and the ids in the order of the leaf blocks: those of triangles first,
@@ -59,134 +146,132 @@ impl Chosen<'_> {
     /// The order is the one that [`bundles_are_sound`](super::bundles_are_sound) expects.
     pub fn emit<const W: usize>(
         &self,
+        outline: &Outline,
         bundles: &mut [Bundle<W>],
         ids: &mut [u32],
         first_sphere: usize,
+        caller: &Caller,
     ) -> Option<()> {
         let (triangles, spheres) = ids.split_at_mut_checked(first_sphere)?;
-        let mut kinds = [(KIND_TRIANGLES, triangles, 0), (KIND_SPHERES, spheres, 0)];
-        self.for_each_bundle::<W>(|numbers, lanes| {
-            let (number, mut next_child) = numbers;
-            let bundle = bundles.get_mut(number as usize)?;
-            *bundle = Bundle::EMPTY;
-            for (i, lane) in lanes.iter().enumerate() {
-                let aabb = self.nodes.get(lane.node as usize)?.aabb();
-                for k in 0..3 {
-                    bundle.walls[k][i] = aabb.lower[k];
-                    bundle.walls[3 + k][i] = aabb.upper[k];
-                }
-                bundle.refs[i] = if lane.is_leaf {
-                    let content = self.content(lane.node)?;
-                    let (kind, free, blocks) = &mut kinds[usize::from(content.is_sphere)];
-                    let (own, rest) =
-                        core::mem::take(free).split_at_mut_checked(content.end - content.first)?;
-                    own.copy_from_slice(self.ids.get(content.first..content.end)?);
-                    *own.first_mut()? |= BEGINS;
-                    *free = rest;
-                    *blocks += 1;
-                    ChildRef::leaf(*kind, *blocks - 1)
-                } else {
-                    next_child += 1;
-                    ChildRef::bundle(next_child - 1)
-                };
+        let mut blocks = Blocks { ids: [triangles, spheres], next: [0; 2] };
+        let mut jobs = [const { None::<Job<W>> }; MOST];
+        let mut places = jobs.iter_mut().zip(&outline.parts);
+        let mut free = Free { bundles, first: 0 };
+        let root = self.lanes_of::<W>(0)?;
+        let bundle = free.take(1)?.first_mut()?;
+        self.fill(bundle, (root.all(), free.first), &mut blocks)?;
+        let children = free.take(root.inner().len() as u32)?;
+        for (node, bundle) in root.inner().zip(children) {
+            let lanes = self.lanes_of::<W>(node)?;
+            self.fill(bundle, (lanes.all(), free.first), &mut blocks)?;
+            let children = free.take(lanes.inner().len() as u32)?;
+            for (node, bundle) in lanes.inner().zip(children) {
+                let (job, part) = places.next()?;
+                let (first, blocks) = (free.first, blocks.of(part)?);
+                let (below, written) = (free.take(part.bundles)?, None);
+                *job = Some(Job { node, bundle, below, first, blocks, written });
             }
-            Some(())
+        }
+        caller.for_each(&mut jobs, |job| {
+            if let Some(job) = job {
+                job.written = self.write(job);
+            }
+        });
+        jobs.iter().flatten().try_for_each(|job| job.written)
+    }
+
+    /// Writes the bundles of a part.
+    fn write<const W: usize>(&self, job: &mut Job<W>) -> Option<()> {
+        let Job { node, bundle, below, first, blocks, .. } = job;
+        // The part's own bundle has a number that none below has.
+        self.for_each_from::<W>((*node, 0), *first, |(number, next), lanes| {
+            let place = match number {
+                0 => &mut **bundle,
+                _ => below.get_mut((number - *first) as usize)?,
+            };
+            self.fill(place, (lanes.all(), next), blocks)
         })
     }
 
-    /// Calls `f` with the number of each bundle, the number of its first inner child, and its lanes,
-    /// parents before children and subtree after subtree.
-    fn for_each_bundle<const W: usize>(
+    /// Makes a bundle of lanes, of which those that are bundles have the numbers from `next` on.
+    #[inline(always)]
+    fn fill<const W: usize>(
         &self,
-        mut f: impl FnMut((u32, u32), &[Lane]) -> Option<()>,
+        bundle: &mut Bundle<W>,
+        (lanes, mut next): (&[Lane], u32),
+        blocks: &mut Blocks,
     ) -> Option<()> {
-        // Nodes with the numbers of their bundles; each level leaves at most all lanes but one behind.
-        let mut stack = [(0u32, 0u32); MAX_DEPTH * 15 + 1];
-        let (mut pending, mut next) = (1, 1);
-        while pending > 0 {
-            pending -= 1;
-            let (node, number) = stack[pending];
-            let mut lanes = [Lane::default(); W];
-            let count = self.lanes_of(node, &mut lanes)?;
-            let lanes = lanes.get(..count)?;
-            f((number, next), lanes)?;
-            let children = lanes.iter().filter(|lane| !lane.is_leaf);
-            for (lane, number) in children.clone().zip(next..) {
-                *stack.get_mut(pending)? = (lane.node, number);
-                pending += 1;
+        *bundle = Bundle::EMPTY;
+        for (i, lane) in lanes.iter().enumerate() {
+            let aabb = self.nodes.get(lane.node as usize)?.aabb();
+            for k in 0..3 {
+                bundle.walls[k][i] = aabb.lower[k];
+                bundle.walls[3 + k][i] = aabb.upper[k];
             }
-            let count = children.count();
-            stack.get_mut(pending - count..pending)?.reverse();
-            next += count as u32;
+            bundle.refs[i] = if lane.is_leaf {
+                let content = self.content(lane.node)?;
+                let ids = self.ids.get(content.first..content.end)?;
+                blocks.push(usize::from(content.is_sphere), ids)?
+            } else {
+                next += 1;
+                ChildRef::bundle(next - 1)
+            };
         }
         Some(())
     }
 
-    /// The lanes of the bundle that stands for `node`, left before right but leaves last: what is pushed last is taken
-    /// first, and any hit is found sooner in a leaf.
-    fn lanes_of<const W: usize>(&self, node: u32, lanes: &mut [Lane; W]) -> Option<usize> {
-        let mut stack = [(0u32, 0usize); W];
-        stack[0] = (node, W);
-        let (mut pending, mut count) = (1, 0);
-        let (mut leaves, mut leaf_count) = ([Lane::default(); W], 0);
+    /// Calls `f` for a bundle and each below it, with its number, the number of its first inner child, and its lanes,
+    /// parents before children and subtree after subtree. The first below has the number `next`.
+    fn for_each_from<const W: usize>(
+        &self,
+        first: (u32, u32),
+        mut next: u32,
+        mut f: impl FnMut((u32, u32), &Lanes<W>) -> Option<()>,
+    ) -> Option<()> {
+        // Nodes with the numbers of their bundles; each level leaves at most all lanes but one behind.
+        let mut stack = [(0u32, 0u32); MAX_DEPTH * 15 + 1];
+        stack[0] = first;
+        let mut pending = 1;
         while pending > 0 {
             pending -= 1;
-            let (at, slots) = stack[pending];
-            let node_at = self.nodes.get(at as usize)?;
-            let choice = if node_at.is_leaf() { None } else { choice_of(self.choices, node_at) };
-            let is_leaf = choice.is_none_or(|choice| choice.is_leaf());
-            let splits = match choice {
-                // A bundle's own node is split, unless it is the root and all is one leaf.
-                Some(_) if at == node => at != 0 || !is_leaf,
-                Some(choice) => slots > 1 && !choice.takes_one(slots),
-                None => false,
-            };
-            match choice.filter(|_| splits) {
-                Some(choice) => {
-                    let left = choice.left_of(slots);
-                    *stack.get_mut(pending)? = (node_at.first + 1, slots.checked_sub(left)?);
-                    *stack.get_mut(pending + 1)? = (node_at.first, left);
-                    pending += 2;
-                }
-                None if is_leaf => {
-                    *leaves.get_mut(leaf_count)? = Lane { node: at, is_leaf };
-                    leaf_count += 1;
-                }
-                None => {
-                    *lanes.get_mut(count)? = Lane { node: at, is_leaf };
-                    count += 1;
-                }
+            let (node, number) = stack[pending];
+            let lanes = self.lanes_of(node)?;
+            f((number, next), &lanes)?;
+            let count = lanes.inner().len();
+            // The first is taken next.
+            let places = stack.get_mut(pending..pending + count)?;
+            for (place, child) in
+                places.iter_mut().zip(lanes.inner().zip(next..next + count as u32).rev())
+            {
+                *place = child;
             }
+            pending += count;
+            next += count as u32;
         }
-        lanes.get_mut(count..count + leaf_count)?.copy_from_slice(leaves.get(..leaf_count)?);
-        Some(count + leaf_count)
-    }
-
-    /// What lies below a node that is a leaf.
-    fn content(&self, node: u32) -> Option<Content> {
-        let (mut left, mut right) = (node, node);
-        while let Some(inner) = self.nodes.get(left as usize).filter(|n| !n.is_leaf()) {
-            left = inner.first;
-        }
-        while let Some(inner) = self.nodes.get(right as usize).filter(|n| !n.is_leaf()) {
-            right = inner.first + 1;
-        }
-        let (left, right) = (self.nodes.get(left as usize)?, self.nodes.get(right as usize)?);
-        let (count, is_sphere) = Grown::of(right);
-        Some(Content { first: left.first as usize, end: right.first as usize + count, is_sphere })
+        Some(())
     }
 }
 
-/// The ids `first .. end` of one leaf block.
-struct Content {
-    first: usize,
-    end: usize,
-    is_sphere: bool,
+/// Bundles that are not written, and the number of the first.
+struct Free<'b, const W: usize> {
+    bundles: &'b mut [Bundle<W>],
+    first: u32,
+}
+
+impl<'b, const W: usize> Free<'b, W> {
+    fn take(&mut self, count: u32) -> Option<&'b mut [Bundle<W>]> {
+        let free = core::mem::take(&mut self.bundles);
+        let (taken, rest) = free.split_at_mut_checked(count as usize)?;
+        self.bundles = rest;
+        self.first += count;
+        Some(taken)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::block::BvhNode;
     use crate::bvh::bins::Effort;
     use crate::bvh::branch::grow;
     use crate::bvh::choose::choose;
@@ -194,7 +279,6 @@ mod tests {
     use crate::bvh::refs::PrimRef;
     use crate::bvh::split::Areas;
     use crate::bvh::tree::{Depth, Limits};
-    use crate::caller::Caller;
     use crate::math::Aabb;
     use crate::prim::Source;
     use crate::scene::Scene;
@@ -296,9 +380,9 @@ mod tests {
         let area = |node: u32| areas().of(&nodes[node as usize].aabb());
         let mut sum = area(0) + PRICE * (28 * W) as f32 / 256.0;
         Chosen { nodes, choices: &choices, ids: &[] }
-            .for_each_bundle::<W>(|_, lanes| {
-                assert!((1..=W).contains(&lanes.len()));
-                for lane in lanes {
+            .for_each_from::<W>((0, 0), 1, |_, lanes| {
+                assert!((1..=W).contains(&lanes.all().len()));
+                for lane in lanes.all() {
                     let (cost, bytes) = if lane.is_leaf { (LEAF, 256) } else { (1.0, 28 * W) };
                     sum += cost * area(lane.node) + PRICE * bytes as f32 / 256.0;
                 }

@@ -12,6 +12,7 @@ mod curve;
 mod emit;
 mod fill;
 mod fits;
+mod lanes;
 mod order;
 mod places;
 mod plan;

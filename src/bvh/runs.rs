@@ -35,7 +35,6 @@ pub(super) fn put_into_runs(
     let size = places.refs + bytes.len();
     let (front, back) = bytes.split_at_mut_checked((REF + KEYS) * count)?;
     let (refs, keys) = front.split_at_mut_checked(REF * count)?;
-    let runs = storage::view_mut::<PrimRef>(back, 0, count)?;
     let keys = storage::view_mut::<u64>(keys, 0, 2 * count)?.split_at_mut(count);
     let along = storage::view::<PrimRef>(refs, 0, count).filter(|refs| refs.len() >= FROM)?;
     let words = along_curve(along, apart, keys, caller)?;

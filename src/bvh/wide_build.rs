@@ -5,8 +5,9 @@ use super::branch::{Size, grow};
 use super::choose::choose;
 use super::collapse::Grounds;
 use super::compact;
-use super::emit::{Chosen, Sizes};
+use super::emit::{Outline, Sizes};
 use super::fill::{pack, take_marks_off};
+use super::lanes::Chosen;
 use super::places::{PAIR, Places};
 use super::plan::{Plan, leaf_max};
 use super::refs::PrimRef;
@@ -117,12 +118,12 @@ where
     let mean = whole / prims as f32;
     for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
         let worth = Worth { areas, price, census };
-        let sizes = scratch.choose::<W>(scene, survey, worth, how.caller, bytes)?;
-        let counts = counts(survey, census, prims, &sizes, W as u32);
+        let outline = scratch.choose::<W>(scene, survey, worth, how.caller, bytes)?;
+        let counts = counts(survey, census, prims, &outline.sizes, W as u32);
         let at = counts.offsets()?;
         if at.words <= scratch.choices && at.end <= bytes.len() {
             how.caller.done(0.85)?;
-            scratch.emit::<W>(first_sphere, &counts, bytes)?;
+            scratch.emit::<W>(&outline, first_sphere, &counts, how.caller, bytes)?;
             let parts = counts.parts_mut(bytes)?;
             match census.is_index {
                 true => take_marks_off(parts.prim_ids),
@@ -240,7 +241,7 @@ impl Scratch {
         Worth { areas, price, census }: Worth,
         caller: &Caller,
         bytes: &mut [u8],
-    ) -> Option<Sizes> {
+    ) -> Option<Outline> {
         let (front, tail) = bytes.split_at_mut_checked(self.ids)?;
         let ids = storage::view::<u32>(tail, 0, self.prims)?;
         let nodes = storage::view::<BvhNode>(tail, self.nodes - self.ids, self.node_count)?;
@@ -252,13 +253,15 @@ impl Scratch {
         let grounds = Grounds { nodes, ids, areas, price, together };
         let source = Source { scene, geometries, named: census.refit };
         choose::<W>(&grounds, source, caller, choices)?;
-        Chosen { nodes, choices, ids }.sizes::<W>()
+        Chosen { nodes, choices, ids }.outline::<W>(caller)
     }
 
     fn emit<const W: usize>(
         &self,
+        outline: &Outline,
         first_sphere: usize,
         counts: &Counts,
+        caller: &Caller,
         bytes: &mut [u8],
     ) -> Option<()>
     where
@@ -273,6 +276,6 @@ impl Scratch {
         let PartsMut { prim_ids, bundles, .. } = front_counts.parts_mut(front)?;
         let count = bundles.len() / (W * LANE);
         let bundles = storage::view_mut::<Bundle<W>>(bundles, 0, count)?;
-        chosen.emit(bundles, prim_ids, first_sphere)
+        chosen.emit(outline, bundles, prim_ids, first_sphere, caller)
     }
 }
