@@ -1,11 +1,13 @@
 //! Embree 3 through the shim in `embree.c`.
 
-use std::ffi::{CStr, c_char, c_int};
+use std::ffi::{CStr, CString, c_char, c_int};
 use std::rc::Rc;
+use std::time::Instant;
 
 use raykern::{Hit, Ray};
 use raykern_harness::model::Model;
 
+use crate::builds::Builder;
 use crate::lineup::{Class, Lineup, Tracer};
 use crate::motion::Follower;
 use crate::options::Options;
@@ -198,6 +200,22 @@ fn timed_scene(model: &Model, way: Way) -> (Option<Scene>, f64) {
     (scene, crate::watch::median(&commits))
 }
 
+/// Every quality, built by the default of instruction sets; without the copying of meshes.
+pub fn builders() -> Vec<Builder> {
+    let builders = SETUPS.iter().filter(|setup| setup.flags == PLAIN).map(|setup| Builder {
+        name: setup.name.to_string(),
+        build: Box::new(|model, threads| {
+            let config = CString::new(format!("threads={threads},start_threads=1")).ok()?;
+            let scene = Scene::configured(model, setup.quality, PLAIN, &config)?;
+            let started = Instant::now();
+            let failed = scene.commit();
+            (!failed).then(|| started.elapsed().as_secs_f64())
+        }),
+        imagined: None,
+    });
+    builders.collect()
+}
+
 /// Every way to follow one mesh that moves, by name. Like the others, each is timed without the copying of vertices.
 pub fn followers(model: &Model, options: &Options) -> Vec<(String, Box<dyn Follower>)> {
     let mut followers: Vec<(String, Box<dyn Follower>)> = Vec::new();
@@ -255,6 +273,10 @@ struct Scene(*mut RawScene);
 
 impl Scene {
     fn new(model: &Model, Way { quality, flags, config }: Way) -> Option<Self> {
+        Scene::configured(model, quality, flags, config)
+    }
+
+    fn configured(model: &Model, quality: c_int, flags: c_int, config: &CStr) -> Option<Self> {
         // SAFETY: the string ends with a zero.
         let raw = unsafe { bench_embree_new(config.as_ptr(), quality, flags) };
         (!raw.is_null()).then_some(Scene(raw))?.with_meshes(model)

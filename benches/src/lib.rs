@@ -1,5 +1,6 @@
 //! Measures raykern against its peers: what the programs of this crate share.
 
+pub mod builds;
 pub mod c_face;
 pub mod check;
 #[cfg(feature = "embree")]

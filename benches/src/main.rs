@@ -8,10 +8,16 @@ use clap::Parser;
 
 use raykern_bench::options::Options;
 use raykern_bench::watch::Watch;
-use raykern_bench::{grids, instances, measure, motion, points, ratios, report, scenes, watch};
+use raykern_bench::{
+    builds, grids, instances, measure, motion, points, ratios, report, scenes, watch,
+};
 
 fn main() -> Result<()> {
     let options = Options::parse();
+    if options.builds {
+        println!("raykern {} on {}", env!("CARGO_PKG_VERSION"), report::processor());
+        return builds::run(&options);
+    }
     report::machine(watch::stay_on(options.core), &options);
     if let Some(backend) = options.backend {
         println!("ours with {:?}", backend.force());

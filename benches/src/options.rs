@@ -44,6 +44,12 @@ pub struct Options {
     /// Instead of still scenes: some that move, what a frame costs by refitting or building anew, and rays after it.
     #[arg(long)]
     pub motion: bool,
+    /// Instead of rays: builds by one thread and by several.
+    #[arg(long)]
+    pub builds: bool,
+    /// With --builds: how many; else as many as there are cores.
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
     /// Instead of still scenes: one model many times, by instances.
     #[arg(long)]
     pub instances: bool,
@@ -97,6 +103,12 @@ impl Options {
     /// How many timed runs.
     pub fn run_count(&self) -> usize {
         self.runs.unwrap_or(if self.quick { 3 } else { 7 }).max(1)
+    }
+
+    /// How many threads build.
+    pub fn thread_count(&self) -> usize {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        self.threads.unwrap_or_else(cores).max(1)
     }
 
     /// Whether a scene is asked for by name; `None` when no scene is named at all.

@@ -54,13 +54,19 @@ pub(super) fn put_into_runs(
 }
 
 /// Replaces numbers of entries of the order, which is at the end of `free`, by these entries.
-pub(super) fn name_ids(ids: &mut [u32], free: &[u8]) -> Option<()> {
+pub(super) fn name_ids(ids: &mut [u32], free: &[u8], caller: &Caller) -> Option<()> {
     let order = free.len().checked_sub(size_of_val(ids))?;
     let order = storage::view::<u32>(free, order, ids.len())?;
-    for id in ids {
-        *id = *order.get(*id as usize)?;
+    let size = caller.part_size(ids.len(), PIECE);
+    let mut parts = [const { None }; PARTS];
+    for (part, ids) in parts.iter_mut().zip(ids.chunks_mut(size)) {
+        *part = Some((ids, Some(())));
     }
-    Some(())
+    caller.for_each(&mut parts, |part| {
+        let Some((ids, named)) = part else { return };
+        *named = ids.iter_mut().try_for_each(|id| Some(*id = *order.get(*id as usize)?));
+    });
+    parts.iter().flatten().try_for_each(|(_, named)| *named)
 }
 
 /// Runs end with every so many refs.

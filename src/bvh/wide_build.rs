@@ -175,7 +175,7 @@ fn grow_tree(
     let size = grow(nodes, slots, count, &limits, how.caller)?;
     let (free, ids) = ids_to_end(refs, &size)?;
     if in_runs {
-        name_ids(ids, free)?;
+        name_ids(ids, free, how.caller)?;
     }
     if uneven.is_some() {
         mend(nodes.get_mut(..size.nodes)?, ids, areas, free)?;
