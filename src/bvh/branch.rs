@@ -4,7 +4,7 @@ use super::MAX_DEPTH;
 use super::refs::PrimRef;
 use super::split::{Areas, Extent};
 use super::spread::part_size;
-use super::task::{Known, Task};
+use super::task::{Known, Split, Task};
 use super::tree::{Grown, Limits, Splitter};
 use crate::block::BvhNode;
 use crate::caller::Caller;
@@ -162,7 +162,6 @@ impl Splitter<'_, '_, '_> {
                     count += 1;
                     continue;
                 };
-                // More than a leaf, so it is split.
                 let (aabb, children) = parted.as_ref()?;
                 *nodes.get_mut(task.node as usize)? = BvhNode::inner(aabb, task.pairs);
                 tasks[count..count + 2].copy_from_slice(children);
@@ -176,8 +175,13 @@ impl Splitter<'_, '_, '_> {
     fn children(self, task: &Task, slots: &mut [PrimRef]) -> Option<(Aabb, [Task; 2])> {
         let refs = slots.get(..task.count)?;
         let extent = task.known.extent(refs, self.step(refs, task.even));
-        let split = self.part(slots, task, &extent, &mut self.scratch())?;
-        Some((extent.bounds.aabb(), task.children(&split, task.pairs, slots)?))
+        let (mut left, mut right, mut split) = (Task::UNUSED, *task, Split::NONE);
+        // More than a leaf, so it is split.
+        if !self.part(slots, task, &extent, (&mut self.scratch(), &mut split)) {
+            return None;
+        }
+        right.part(&mut left, &split, task.pairs, slots)?;
+        Some((extent.bounds.aabb(), [left, right]))
     }
 
     /// Tasks with more refs than this are to be split: the least number, from `grain` on, for which there is room;

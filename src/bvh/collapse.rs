@@ -136,30 +136,42 @@ impl<const W: usize> Results<W> {
         choices: &mut [u64],
     ) -> Option<()> {
         let nodes = grounds.nodes.get(2 * pairs.start..2 * pairs.end)?;
-        let (mut left_leaf, mut right_leaf) = (Decided::NOTHING, Decided::NOTHING);
+        let mut leaf = Decided::NOTHING;
         for (pair, choice) in nodes.chunks_exact(2).zip(choices).rev() {
             let [left, right] = pair else { return None };
-            // What was decided last is left.
-            let left = if left.is_leaf() {
-                left_leaf.set_leaf(left, grounds, shapes)?;
-                &left_leaf
-            } else {
-                self.pending = self.pending.checked_sub(1)?;
-                self.stack.get(self.pending)?
+            // What was decided last is left. One of both becomes what they are together, where it stands: copies of what was just
+            // written by parts take long.
+            let inner = usize::from(!left.is_leaf()) + usize::from(!right.is_leaf());
+            let first = self.pending.checked_sub(inner)?;
+            let chosen = match self.stack.get_mut(first..first + inner.max(1))? {
+                [right, left, ..] => right.join(Side::Left, left, grounds),
+                [both] if inner == 1 => {
+                    let (side, node) = match left.is_leaf() {
+                        true => (Side::Left, left),
+                        false => (Side::Right, right),
+                    };
+                    leaf.set_leaf(node, grounds, shapes)?;
+                    both.join(side, &leaf, grounds)
+                }
+                [both] => {
+                    both.set_leaf(left, grounds, shapes)?;
+                    leaf.set_leaf(right, grounds, shapes)?;
+                    both.join(Side::Right, &leaf, grounds)
+                }
+                [] => return None,
             };
-            let right = if right.is_leaf() {
-                right_leaf.set_leaf(right, grounds, shapes)?;
-                &right_leaf
-            } else {
-                self.pending = self.pending.checked_sub(1)?;
-                self.stack.get(self.pending)?
-            };
-            let (decided, chosen) = join(left, right, grounds);
             *choice = chosen.0;
-            self.push(decided)?;
+            self.pending = first + 1;
         }
         Some(())
     }
+}
+
+/// The side of a pair.
+#[derive(Clone, Copy, PartialEq)]
+enum Side {
+    Left,
+    Right,
 }
 
 impl<const W: usize> Decided<W> {
@@ -189,6 +201,28 @@ impl<const W: usize> Decided<W> {
         self.content.corners.become_those_of(triangles.filter_map(|id| triangle(*id, shapes)));
         Some(())
     }
+
+    /// Becomes what it is together with `other` on this side.
+    #[inline]
+    fn join(&mut self, side: Side, other: &Self, grounds: &Grounds) -> Choice {
+        let Grounds { areas, price, .. } = *grounds;
+        let (shared, split) =
+            if side == Side::Left { share(other, self) } else { share(self, other) };
+        self.aabb.add(&other.aabb);
+        let area = areas.of(&self.aabb);
+        self.content.add(&other.content);
+        let block =
+            if self.content.kind == Kind::Much { f32::INFINITY } else { LEAF * area + price };
+        let bundle = area + price * bundle_price(W) + shared[W - 1];
+        let is_leaf = block <= bundle;
+        let one = if is_leaf { block } else { bundle };
+        // With more lanes the cost of sharing only falls.
+        let least = (1..W).find(|&i| shared[i] < one).map_or(W + 1, |i| i + 1);
+        self.cost = shared;
+        self.cost[..(least - 1).min(W)].fill(one);
+        self.lanes += other.lanes;
+        Choice::new(is_leaf, least, &split)
+    }
 }
 
 /// The corners of a triangle.
@@ -202,28 +236,6 @@ fn triangle(id: u32, shapes: &mut Shapes) -> Option<[[f32; 3]; 3]> {
         Shape::Triangle(corners) => Some(corners),
         Shape::Sphere { .. } | Shape::Box(_) => None,
     }
-}
-
-fn join<const W: usize>(
-    left: &Decided<W>,
-    right: &Decided<W>,
-    &Grounds { areas, price, .. }: &Grounds,
-) -> (Decided<W>, Choice) {
-    let mut aabb = left.aabb;
-    aabb.add(&right.aabb);
-    let area = areas.of(&aabb);
-    let content = left.content.with(&right.content);
-    let (shared, split) = share(left, right);
-    let block = if content.kind == Kind::Much { f32::INFINITY } else { LEAF * area + price };
-    let bundle = area + price * bundle_price(W) + shared[W - 1];
-    let is_leaf = block <= bundle;
-    let one = if is_leaf { block } else { bundle };
-    // With more lanes the cost of sharing only falls.
-    let least = (1..W).find(|&i| shared[i] < one).map_or(W + 1, |i| i + 1);
-    let mut cost = shared;
-    cost[..(least - 1).min(W)].fill(one);
-    let lanes = left.lanes + right.lanes;
-    (Decided { cost, lanes, aabb, content }, Choice::new(is_leaf, least, &split))
 }
 
 /// Bytes of a bundle against those of a leaf block.
@@ -253,21 +265,17 @@ fn share<const W: usize>(left: &Decided<W>, right: &Decided<W>) -> ([f32; W], [u
 impl Content {
     const MUCH: Content = Content { kind: Kind::Much, count: 0, corners: Corners::NONE };
 
-    /// What one block would hold of both, if it can.
-    fn with(&self, other: &Content) -> Content {
-        let count = self.count + other.count;
+    /// Becomes what one block would hold of both, if it can.
+    fn add(&mut self, other: &Content) {
+        self.count += other.count;
         let most = match self.kind {
             Kind::Triangles => TRIANGLES,
             Kind::Spheres => SPHERES,
-            Kind::Much => 0,
+            Kind::Much => return,
         };
-        if self.kind != other.kind || count > most {
-            return Content::MUCH;
+        let fits = self.kind == other.kind && self.count <= most;
+        if !fits || self.kind == Kind::Triangles && !self.corners.merge(&other.corners) {
+            self.kind = Kind::Much;
         }
-        let mut both = Content { count, ..*self };
-        if self.kind == Kind::Triangles && !both.corners.merge(&other.corners) {
-            both.kind = Kind::Much;
-        }
-        both
     }
 }

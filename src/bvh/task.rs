@@ -32,6 +32,11 @@ pub(super) struct Split {
     pub sides: [Known; 2],
 }
 
+impl Split {
+    pub const NONE: Split =
+        Split { counts: [0; 2], least: [0; 2], even: [false; 2], sides: [Known::NONE; 2] };
+}
+
 /// The boxes around refs and their centres, if they are kept. They are two thirds of a task, and where room is scarce they are
 /// found again.
 #[derive(Clone, Copy)]
@@ -40,17 +45,17 @@ pub(super) struct Known([Extent; KEPT]);
 const KEPT: usize = if SMALL { 0 } else { 1 };
 
 impl Known {
-    /// Those of one side of a split. Where a plane will be chosen by every `step`-th ref, the centres are those of these and
+    const NONE: Known = Known([Extent { bounds: Box4::ZERO, centres: Box4::ZERO }; KEPT]);
+
+    /// Become those of one side of a split. Where a plane will be chosen by every `step`-th ref, the centres are those of these and
     /// the box is left open, as every pass over many refs takes its time.
-    pub fn of_side(refs: &[PrimRef], step: usize) -> Known {
-        let mut known = Known([Extent::EMPTY; KEPT]);
-        for extent in &mut known.0 {
+    pub fn become_those_of(&mut self, refs: &[PrimRef], step: usize) {
+        for extent in &mut self.0 {
             *extent = Extent::of_sample(refs, step);
             if step > 1 {
                 extent.bounds = Box4::EMPTY;
             }
         }
-        known
     }
 
     pub fn of(extent: Extent) -> Known {
@@ -69,19 +74,21 @@ impl Known {
 
 impl Task {
     /// All zero, as that takes no room in a program.
-    const UNUSED: Task = {
-        let zero = Extent { bounds: Box4::ZERO, centres: Box4::ZERO };
-        let ([first, count, room], [depth, budget], known) = ([0; 3], [0; 2], Known([zero; KEPT]));
+    pub const UNUSED: Task = {
+        let ([first, count, room], [depth, budget], known) = ([0; 3], [0; 2], Known::NONE);
         Task { node: 0, pairs: 0, first, count, room, depth, budget, even: false, known }
     };
 
-    /// The tasks of the sides, whose nodes are the pair at `pair`. The right one's refs are moved behind
-    /// the left one's room.
-    pub fn children(&self, split: &Split, pair: u32, slots: &mut [PrimRef]) -> Option<[Task; 2]> {
-        let depth = self.depth + 1;
+    /// Becomes the task of the right side, and `left` that of the left one; their nodes are the pair at `pair`. The right one's refs
+    /// are moved behind the left one's room.
+    pub fn part(
+        &mut self,
+        left: &mut Task,
+        split: &Split,
+        pair: u32,
+        slots: &mut [PrimRef],
+    ) -> Option<()> {
         let ([count, right_count], budget) = (split.counts, share(self, split));
-        let ([left, right], [even, right_even]) = (split.sides, split.even);
-        let (first, pairs) = (self.first, pair + 2);
         // Each side has its part of the free slots.
         let free = self.room.checked_sub(count + right_count)?;
         let room = count + part_of(free, count, count + right_count);
@@ -90,13 +97,17 @@ impl Task {
             slots.get(..room + right_count)?;
             slots.copy_within(count..count + right_count, room);
         }
-        let left = Task { node: pair, pairs, first, count, room, depth, budget, even, known: left };
+        self.depth += 1;
+        (left.node, left.pairs, left.first, left.depth) = (pair, pair + 2, self.first, self.depth);
+        (left.count, left.room, left.budget) = (count, room, budget);
+        (left.even, left.known) = (split.even[0], split.sides[0]);
         // A subtree has a pair for each of its leaves but one.
-        let pairs = pairs + 2 * (budget as u32).saturating_sub(1);
-        let (first, count, room) = (first + room, right_count, self.room - room);
-        let budget = self.budget - budget;
-        let (node, even) = (pair + 1, right_even);
-        Some([left, Task { node, pairs, first, count, room, depth, budget, even, known: right }])
+        self.pairs = left.pairs + 2 * (budget as u32).saturating_sub(1);
+        self.node = pair + 1;
+        (self.first, self.count) = (self.first + room, right_count);
+        (self.room, self.budget) = (self.room - room, self.budget - budget);
+        (self.even, self.known) = (split.even[1], split.sides[1]);
+        Some(())
     }
 }
 
@@ -144,9 +155,22 @@ impl Tasks {
         Some(())
     }
 
-    /// The task pushed last.
-    pub fn pop(&mut self) -> Option<Task> {
-        self.count = self.count.checked_sub(1)?;
-        self.tasks.get(self.count).copied()
+    /// The task that is next.
+    pub fn last(&self) -> Option<&Task> {
+        self.tasks.get(self.count.checked_sub(1)?)
+    }
+
+    /// Takes it away.
+    pub fn pop(&mut self) {
+        self.count -= 1;
+    }
+
+    /// Replaces it by those of its sides, the left one last: where they stand.
+    pub fn part_last(&mut self, split: &Split, pair: u32, slots: &mut [PrimRef]) -> Option<()> {
+        let last = self.tasks.get_mut(self.count.checked_sub(1)?..)?;
+        let [task, left, ..] = last else { return None };
+        task.part(left, split, pair, slots)?;
+        self.count += 1;
+        Some(())
     }
 }

@@ -10,7 +10,7 @@ use super::spatial::{best_cut, overlap};
 use super::split::{Areas, Extent, greater};
 use super::spread::unevenness;
 use super::sweep::{FEW, sort_few, sweep};
-use super::task::{Known, Split, Task, Tasks};
+use super::task::{Split, Task, Tasks};
 use crate::block::BvhNode;
 use crate::block::leaf::TRIANGLES;
 use crate::kinds::{BALLS, SPHERES, WIDE};
@@ -121,6 +121,13 @@ const ONE_AXIS: usize = 1024;
 /// Of fewer refs none are cut.
 const CUT_FROM: usize = 32;
 
+/// Where refs are parted.
+struct Place {
+    left_count: usize,
+    /// Triangles from spheres, so few that each kind can be one leaf.
+    by_kind: bool,
+}
+
 /// How nodes are split.
 #[derive(Clone, Copy)]
 pub(super) struct Splitter<'l, 's, 'a> {
@@ -151,53 +158,63 @@ impl<'s, 'a> Splitter<'_, 's, 'a> {
         let mut scratch = self.scratch();
         let mut stack = Tasks::NONE;
         stack.push(whole)?;
-        let mut used = whole.pairs;
-        while let Some(task) = stack.pop() {
+        let (mut used, mut split) = (whole.pairs, Split::NONE);
+        while let Some(task) = stack.last() {
             let first = task.first - whole.first;
             let slots = refs.get_mut(first..first + task.room)?;
             let refs = slots.get(..task.count)?;
             let extent = task.known.extent(refs, self.step(refs, task.even));
-            let split = self.part(slots, &task, &extent, &mut scratch);
+            let parted = self.part(slots, task, &extent, (&mut scratch, &mut split));
             let aabb = extent.bounds.aabb();
-            let node = match &split {
-                None => Grown::leaf(&aabb, task.first, slots.get(..task.count)?),
-                Some(_) => BvhNode::inner(&aabb, used),
+            let node = match parted {
+                false => Grown::leaf(&aabb, task.first, slots.get(..task.count)?),
+                true => BvhNode::inner(&aabb, used),
             };
             match task.node.checked_sub(whole.pairs) {
                 Some(place) if task.depth > whole.depth => *nodes.get_mut(place as usize)? = node,
                 _ => root = Some(node),
             }
-            let Some(split) = split else { continue };
-            let [left, right] = task.children(&split, used, slots)?;
-            used += 2;
+            if !parted {
+                stack.pop();
+                continue;
+            }
             // The left child is taken next, so its subtree is stored before the right one's.
-            stack.push(&right)?;
-            stack.push(&left)?;
+            stack.part_last(&split, used, slots)?;
+            used += 2;
         }
         root
     }
 }
 
 impl Splitter<'_, '_, '_> {
-    /// Parts what the first slots hold in two, or decides for a leaf.
+    /// Parts what the first slots hold in two, and says how in `split`, or decides for a leaf: false.
     pub fn part(
         self,
         slots: &mut [PrimRef],
         task: &Task,
         extent: &Extent,
-        scratch: &mut Scratch,
-    ) -> Option<Split> {
-        let refs = slots.get_mut(..task.count)?;
-        let split = self.part_refs(refs, task, extent, &mut scratch.bins)?;
-        if WIDE && scratch.fits.as_mut().is_some_and(|f| self.is_block(refs, extent, &split, f)) {
-            return None;
+        (scratch, split): (&mut Scratch, &mut Split),
+    ) -> bool {
+        let Some(refs) = slots.get_mut(..task.count) else { return false };
+        let Some(place) = self.part_refs(refs, task, extent, &mut scratch.bins) else {
+            return false;
+        };
+        self.split_at(refs, place.left_count, task.even, split);
+        if place.by_kind {
+            split.least = [1, 1];
         }
-        if task.count < CUT_FROM || task.room == task.count {
-            return Some(split);
+        if WIDE && scratch.fits.as_mut().is_some_and(|f| self.is_block(refs, extent, split, f)) {
+            return false;
         }
         // Compact trees are not cut.
-        let Some(shapes) = scratch.shapes.as_mut().filter(|_| WIDE) else { return Some(split) };
-        Some(self.cut(slots, (task, extent), &split, shapes).unwrap_or(split))
+        if WIDE
+            && task.count >= CUT_FROM
+            && task.room > task.count
+            && let Some(shapes) = &mut scratch.shapes
+        {
+            self.cut(slots, (task, extent), split, shapes);
+        }
+        true
     }
 
     /// Whether refs had better not be parted, but be one leaf block.
@@ -212,14 +229,15 @@ impl Splitter<'_, '_, '_> {
         area(extent) <= left + right && fits.are_a_block(refs)
     }
 
-    /// Parts the refs of a node in two, or decides for a leaf.
+    /// Brings the refs of a node into two parts; `None` for a leaf.
     fn part_refs(
         self,
         refs: &mut [PrimRef],
         task: &Task,
         extent: &Extent,
         bins: &mut Bins,
-    ) -> Option<Split> {
+    ) -> Option<Place> {
+        let at = |left_count| Place { left_count, by_kind: false };
         let (Limits { leaf_max, depth, .. }, areas) = (*self.limits, self.areas);
         let effort = self.effort(task.even);
         let mixed = SPHERES && self.limits.mixed;
@@ -244,29 +262,29 @@ impl Splitter<'_, '_, '_> {
         let lasts = |left_count: usize| self.lasts(task, [left_count, count - left_count]);
         let apart = self.limits.apart;
         if WIDE && task.depth == 0 && (1..count).contains(&apart) && lasts(apart) {
-            return Some(self.split_at(refs, apart, task.even));
+            return Some(at(apart));
         }
         let sah = if count <= FEW {
             let sweep = sweep(refs, areas, lasts)
                 .filter(|s| !may_be_leaf || depth != Depth::Paying || pays(s.work));
-            sweep.map(|s| self.split_at(refs, s.left_count, task.even))
+            sweep.map(|s| at(s.left_count))
         } else {
             // None when all centres are in one point.
             let one_axis = self.limits.blocks.is_some() && count < ONE_AXIS;
             best_plane(refs, &extent.centres, areas, (effort, one_axis), bins).and_then(|plane| {
                 let left_count = plane.part(refs);
-                lasts(left_count).then(|| self.split_at(refs, left_count, task.even))
+                lasts(left_count).then(|| at(left_count))
             })
         };
         match sah {
-            Some(split) => Some(split),
+            Some(place) => Some(place),
             None if may_be_leaf => None,
             // Few, but of two kinds: each kind can be one leaf.
             None if SPHERES && count <= leaf_max => {
                 sort_few(refs, |r| (r.is_sphere(), r.id()));
-                Some(Split { least: [1, 1], ..self.split_at(refs, count - spheres, task.even) })
+                Some(Place { left_count: count - spheres, by_kind: true })
             }
-            None => Some(self.split_at(refs, count / 2, task.even)),
+            None => Some(at(count / 2)),
         }
     }
 
@@ -275,9 +293,9 @@ impl Splitter<'_, '_, '_> {
         self,
         slots: &mut [PrimRef],
         (task, extent): (&Task, &Extent),
-        split: &Split,
+        split: &mut Split,
         shapes: &mut Shapes,
-    ) -> Option<Split> {
+    ) -> Option<()> {
         let refs = slots.get(..task.count)?;
         let (left, right) = refs.split_at_checked(split.counts[0])?;
         let of_side = |side: usize, refs: &[PrimRef]| {
@@ -303,7 +321,8 @@ impl Splitter<'_, '_, '_> {
         }
         let counts = cut.part(slots, task.count, shapes)?;
         let refs = slots.get(..counts[0] + counts[1])?;
-        Some(self.split_at(refs, counts[0], task.even))
+        self.split_at(refs, counts[0], task.even, split);
+        Some(())
     }
 
     /// The fewest leaves that two sides need.
@@ -321,14 +340,16 @@ impl Splitter<'_, '_, '_> {
         left + right <= task.budget && task.depth + 1 + levels < MAX_DEPTH
     }
 
-    /// The sides of a place between refs, which are known to be `even` or not.
-    fn split_at(self, refs: &[PrimRef], left_count: usize, even: bool) -> Split {
+    /// The sides of a place between refs, which are known to be `even` or not. Written where they are read, as a copy would wait
+    /// for the parts of what was just written.
+    fn split_at(self, refs: &[PrimRef], left_count: usize, even: bool, split: &mut Split) {
         let (left, right) = refs.split_at_checked(left_count).unwrap_or((refs, &[]));
         let counts = [left.len(), right.len()];
         let even = [left, right].map(|refs| even || self.are_even(refs));
-        let known = |refs: &[PrimRef], even| Known::of_side(refs, self.step(refs, even));
-        let sides = [known(left, even[0]), known(right, even[1])];
-        Split { counts, least: self.fewest(counts), even, sides }
+        (split.counts, split.least, split.even) = (counts, self.fewest(counts), even);
+        for ((side, refs), even) in split.sides.iter_mut().zip([left, right]).zip(even) {
+            side.become_those_of(refs, self.step(refs, even));
+        }
     }
 
     /// Whether a part of an uneven scene is even, and large enough for that to matter.
