@@ -34,7 +34,9 @@ impl<'s, 'a> BlockWriter<'s, 'a> {
             return None;
         }
         let (count, live) = (ids.len() as u32, low_bits(ids.len() as u32));
-        *block = TriangleBlock { first, count, live, ..TriangleBlock::EMPTY };
+        // Not as one record, which would be put together elsewhere and copied.
+        *block = TriangleBlock::EMPTY;
+        (block.first, block.count, block.live) = (first, count, live);
         self.numbers = Numbers::NONE;
         self.known.forget();
         let (mut corners, mut vertices) = ([0u64; 3], 0);

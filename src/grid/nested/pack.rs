@@ -1,7 +1,7 @@
 //! Packs the lists of some words into leaf blocks and runs.
 
 use super::lists::{BOX_WORDS, END};
-use super::recent::{Recent, TOGETHER};
+use super::recent::{Held, Recent, TOGETHER};
 use crate::block::cells::{Cell, CellBox, LAST, Run, box_word, cell, run_word};
 use crate::block::leaf::{
     KIND_SPHERES, KIND_TRIANGLES, SPHERES, SphereBlock, TriangleBlock, block_ref,
@@ -133,6 +133,8 @@ impl Part<'_> {
         let [triangle_ids, sphere_ids] = &mut self.ids;
         let mut emitter = Emitter {
             shapes: source.shapes(),
+            held: Held::NONE,
+            left: [0; TOGETHER],
             corners: [[[0.0; 3]; 3]; TOGETHER],
             packer: Packer::new(
                 self.triangle_blocks.get_mut(triangle_blocks..)?,
@@ -145,23 +147,22 @@ impl Part<'_> {
             id_counts: [0; 2],
             recent: Recent::NONE,
             few: lists.few,
-            runs: self.runs,
-            run_count: runs,
+            runs: Runs { runs: self.runs, count: runs },
         };
         for word in self.words.chunks_mut(CHUNK).nth(chunk)? {
             let Some((list, cell_box)) = lists.of(*word) else { continue };
             *word = match cell_box {
-                Some(cell_box) => box_word(emitter.cell_box(cell_box)?),
-                None => run_word(emitter.run_count as u32),
+                Some(cell_box) => box_word(emitter.runs.push(Run::of_box(cell_box))?),
+                None => run_word(emitter.runs.count as u32),
             };
             emitter.list(list)?;
         }
-        let Emitter { packer, id_counts, run_count, .. } = emitter;
+        let Emitter { packer, id_counts, runs, .. } = emitter;
         self.used = Used {
             ids: [triangle + id_counts[0], sphere + id_counts[1]],
             sphere_blocks: sphere_blocks + packer.sphere_block_count(),
             triangle_blocks: triangle_blocks + packer.triangle_block_count(),
-            runs: run_count,
+            runs: runs.count,
         };
         Some(())
     }
@@ -170,6 +171,9 @@ impl Part<'_> {
 /// What a chunk is packed to.
 struct Emitter<'s, 'a, 'b> {
     shapes: Shapes<'s, 'a>,
+    /// What is known of a list, and what is left of it. Kept here as a copy of what was just written by parts takes long.
+    held: Held,
+    left: [u32; TOGETHER],
     /// The corners of what is packed next.
     corners: [[[f32; 3]; 3]; TOGETHER],
     packer: Packer<'b>,
@@ -181,28 +185,46 @@ struct Emitter<'s, 'a, 'b> {
     /// The numbers of triangles and of spheres, and how many there are.
     ids: [&'b mut [u32]; 2],
     id_counts: [usize; 2],
+    runs: Runs<'b>,
+}
+
+/// Runs that are written.
+struct Runs<'b> {
     runs: &'b mut [Run],
-    run_count: usize,
+    count: usize,
+}
+
+impl Runs<'_> {
+    /// Writes an entry and returns its number: a run, or the box of a cell before its run.
+    #[inline]
+    fn push(&mut self, run: Run) -> Option<u32> {
+        *self.runs.get_mut(self.count)? = run;
+        self.count += 1;
+        Some(self.count as u32 - 1)
+    }
+
+    /// Lets the run that begins at `first` name lanes of a block.
+    #[inline]
+    fn name(&mut self, block: u32, lanes: u32, first: usize) -> Option<()> {
+        if self.count == first || self.runs.get(self.count - 1)?.block != block {
+            self.push(Run { block, lanes: 0 })?;
+        }
+        self.runs.get_mut(self.count - 1)?.lanes |= lanes;
+        Some(())
+    }
 }
 
 impl Emitter<'_, '_, '_> {
-    /// Writes the box of a cell before its run, and returns its entry.
-    fn cell_box(&mut self, cell_box: CellBox) -> Option<u32> {
-        *self.runs.get_mut(self.run_count)? = Run::of_box(cell_box);
-        self.run_count += 1;
-        Some(self.run_count as u32 - 1)
-    }
-
     /// Packs a list.
     ///
     /// A triangle is stored again for each cell that lists it, unless a block that was filled a moment ago holds it beside enough others of
     /// the list.
     fn list(&mut self, list: &[u32]) -> Option<()> {
-        let first = self.run_count;
+        let first = self.runs.count;
         for ids in list.chunks(TOGETHER) {
             self.list_some(ids, first)?;
         }
-        self.runs.get_mut(self.run_count - 1)?.lanes |= LAST;
+        self.runs.runs.get_mut(self.runs.count - 1)?.lanes |= LAST;
         Some(())
     }
 
@@ -210,20 +232,22 @@ impl Emitter<'_, '_, '_> {
     #[inline]
     fn list_some(&mut self, ids: &[u32], first: usize) -> Option<()> {
         let open = (self.packer.triangle_block_count() as u32).wrapping_sub(1);
-        let mut held = self.recent.hold(ids, open);
-        held.keep(self.enough(), |age, lanes| {
+        let enough = self.enough();
+        self.recent.hold(ids, open, &mut self.held);
+        self.held.keep(enough);
+        let count = self.held.left(ids, &mut self.left);
+        for (age, lanes) in self.held.blocks() {
             let block = block_ref(KIND_TRIANGLES, self.blocks[0] + open - age);
-            self.name(block, lanes, first)
-        })?;
-        let (left, count) = held.left(ids);
-        let left = left.get(..count)?;
-        let triangles = self.look_up(left)?;
-        for (i, id) in left.iter().enumerate() {
+            self.runs.name(block, lanes, first)?;
+        }
+        let triangles = self.look_up(count)?;
+        for i in 0..count {
+            let id = self.left[i % TOGETHER] & !END;
             let (block, lane) = match i < triangles {
-                true => self.pack_triangle(id & !END, self.corners[i % TOGETHER])?,
-                false => self.pack_sphere(id & !END)?,
+                true => self.pack_triangle(id, self.corners[i % TOGETHER])?,
+                false => self.pack_sphere(id)?,
             };
-            self.name(block, 1 << lane, first)?;
+            self.runs.name(block, 1 << lane, first)?;
         }
         Some(())
     }
@@ -237,22 +261,11 @@ impl Emitter<'_, '_, '_> {
         ((stored + part / 2 * blocks) / (part * blocks)).max(ENOUGH_AT_LEAST) as u32
     }
 
-    /// Lets the run that begins at `first` name lanes of a block.
-    #[inline]
-    fn name(&mut self, block: u32, lanes: u32, first: usize) -> Option<()> {
-        if self.run_count == first || self.runs.get(self.run_count - 1)?.block != block {
-            *self.runs.get_mut(self.run_count)? = Run { block, lanes: 0 };
-            self.run_count += 1;
-        }
-        self.runs.get_mut(self.run_count - 1)?.lanes |= lanes;
-        Some(())
-    }
-
-    /// Brings the corners of triangles, which come before spheres; returns how many these are. All at once, as nothing then waits for
+    /// Brings the corners of the triangles that are left, which come before spheres; returns how many these are. All at once, as nothing then waits for
     /// each of them.
     #[inline]
-    fn look_up(&mut self, ids: &[u32]) -> Option<usize> {
-        for (i, (id, corners)) in ids.iter().zip(&mut self.corners).enumerate() {
+    fn look_up(&mut self, count: usize) -> Option<usize> {
+        for (i, (id, corners)) in self.left.iter().zip(&mut self.corners).enumerate().take(count) {
             let id = id & !END;
             *corners = match self.shapes.corners(id) {
                 Some(corners) => corners,
@@ -262,7 +275,7 @@ impl Emitter<'_, '_, '_> {
                 },
             };
         }
-        Some(ids.len())
+        Some(count)
     }
 
     /// Packs a triangle; returns the block and the lane.

@@ -40,58 +40,70 @@ impl Recent {
         (self.ids[slot], self.places[slot]) = (id, block << 4 | lane & 15);
     }
 
-    /// What is known of some numbers while block `open` is filled.
+    /// Finds what is known of some numbers while block `open` is filled.
     #[inline]
-    pub fn hold(&self, ids: &[u32], open: u32) -> Held {
-        let mut held = Held::NONE;
-        held.count = ids.len() as u32;
-        for (id, place_of_id) in ids.iter().zip(&mut held.ages) {
+    pub fn hold(&self, ids: &[u32], open: u32, held: &mut Held) {
+        (held.lanes, held.blocks, held.count) = ([0; BLOCKS as usize], 0, ids.len() as u32);
+        for (id, age_of_id) in ids.iter().zip(&mut held.ages) {
             let id = id & !END;
             let slot = id as usize % SLOTS;
             let age = open.wrapping_sub(self.places[slot] >> 4);
             // No branches, since nobody could guess them.
             let is_known = (self.ids[slot] == id) & (age < BLOCKS);
-            *place_of_id = if is_known { age as u8 } else { u8::MAX };
+            *age_of_id = if is_known { age as u8 } else { u8::MAX };
             held.lanes[age as usize % BLOCKS as usize] |=
                 u16::from(is_known) << (self.places[slot] & 15);
             held.blocks |= u64::from(is_known) << (age % BLOCKS);
         }
-        held
     }
 }
 
 impl Held {
-    const NONE: Self =
+    pub const NONE: Self =
         Held { ages: [u8::MAX; TOGETHER], lanes: [0; BLOCKS as usize], blocks: 0, count: 0 };
 
-    /// Calls `f` with the blocks that hold at least `least` of the numbers, or all, by age and with the lanes of these; the block being
-    /// filled counts whatever it holds, and comes last. The others hold nothing from now on.
+    /// Keeps the blocks that hold at least `least` of the numbers, or all, and the one being filled whatever it holds. The others hold
+    /// nothing from now on.
     #[inline]
-    pub fn keep(&mut self, least: u32, mut f: impl FnMut(u32, u32) -> Option<()>) -> Option<()> {
-        let mut left = self.blocks;
-        while left != 0 {
-            let age = BLOCKS - 1 - left.leading_zeros();
-            let lanes = u32::from(self.lanes[age as usize % BLOCKS as usize]);
-            left &= !(1 << age);
-            if age == 0 || lanes.count_ones() >= least.min(self.count) {
-                f(age, lanes)?;
-            } else {
+    pub fn keep(&mut self, least: u32) {
+        let least = least.min(self.count);
+        for age in Bits64(self.blocks & !1) {
+            if self.lanes[age as usize % BLOCKS as usize].count_ones() < least {
                 self.blocks &= !(1 << age);
             }
         }
-        Some(())
     }
 
-    /// Those of the numbers that are in no block that was kept, and how many these are.
+    /// The blocks that hold any of the numbers, the oldest first: by age, and with the lanes of these.
     #[inline]
-    pub fn left(&self, ids: &[u32]) -> ([u32; TOGETHER], usize) {
-        let (mut left, mut count) = ([0; TOGETHER], 0);
+    pub fn blocks(&self) -> impl Iterator<Item = (u32, u32)> {
+        Bits64(self.blocks).map(|age| (age, u32::from(self.lanes[age as usize % BLOCKS as usize])))
+    }
+
+    /// Writes those of the numbers that are in no block that was kept; returns how many these are.
+    #[inline]
+    pub fn left(&self, ids: &[u32], left: &mut [u32; TOGETHER]) -> usize {
+        let mut count = 0;
         for (id, age) in ids.iter().zip(self.ages) {
             left[count % TOGETHER] = *id;
             let age = u32::from(age);
             count += usize::from((age >= BLOCKS) | (self.blocks >> (age % BLOCKS) & 1 == 0));
         }
-        (left, count)
+        count
+    }
+}
+
+/// The places of bits, the highest first.
+struct Bits64(u64);
+
+impl Iterator for Bits64 {
+    type Item = u32;
+
+    #[inline]
+    fn next(&mut self) -> Option<u32> {
+        let place = self.0.checked_ilog2()?;
+        self.0 &= !(1 << place);
+        Some(place)
     }
 }
 
@@ -100,14 +112,17 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
+    fn hold(recent: &Recent, ids: &[u32], open: u32) -> Held {
+        // What was held before does not matter.
+        let mut held =
+            Held { ages: [3; TOGETHER], lanes: [9; BLOCKS as usize], blocks: 9, count: 9 };
+        recent.hold(ids, open, &mut held);
+        held
+    }
+
     fn kept(held: &mut Held, least: u32) -> Vec<(u32, u32)> {
-        let mut kept = Vec::new();
-        let all = held.keep(least, |age, lanes| {
-            kept.push((age, lanes));
-            Some(())
-        });
-        assert!(all.is_some());
-        kept
+        held.keep(least);
+        held.blocks().collect()
     }
 
     #[test]
@@ -117,13 +132,14 @@ mod tests {
             recent.put(id, block, lane);
         }
         let ids = [7, 8, 9, 10, 11 | END, 12];
-        let mut held = recent.hold(&ids, 5);
+        let mut held = hold(&recent, &ids, 5);
         assert_eq!(kept(&mut held, 2), [(2, 0b10101), (0, 1 << 15)]);
-        let (left, count) = held.left(&ids);
+        let mut left = [0; TOGETHER];
+        let count = held.left(&ids, &mut left);
         assert_eq!(left[..count], [9, 12]);
-        let mut held = recent.hold(&ids[..2], 5);
+        let mut held = hold(&recent, &ids[..2], 5);
         assert_eq!(kept(&mut held, 9), [(2, 0b101)], "all of them");
-        let mut held = recent.hold(&ids[..2], 3 + BLOCKS);
+        let mut held = hold(&recent, &ids[..2], 3 + BLOCKS);
         assert_eq!(kept(&mut held, 1), [], "too long ago");
     }
 
@@ -132,8 +148,8 @@ mod tests {
         let mut recent = Recent::NONE;
         recent.put(5, 0, 3);
         recent.put(5, 1, 0);
-        assert_eq!(kept(&mut recent.hold(&[5], 1), 9), [(0, 1)]);
+        assert_eq!(kept(&mut hold(&recent, &[5], 1), 9), [(0, 1)]);
         recent.put(5 + SLOTS as u32, 1, 1);
-        assert_eq!(kept(&mut recent.hold(&[5], 1), 1), [], "another took its slot");
+        assert_eq!(kept(&mut hold(&recent, &[5], 1), 1), [], "another took its slot");
     }
 }
