@@ -166,6 +166,33 @@ impl Plane {
     }
 }
 
+/// A place between two bins, and the work of a split there, in one number: the least is the first of those of the least work, and finding it
+/// takes no branch, which would be guessed wrong.
+///
+/// ```text
+/// bit 0     8      16        32
+///     | bin | axis | nothing | work |
+/// ```
+///
+/// The bits of floats that are not negative are in their order; infinity and NaN come last. The work of a side without refs is one of
+/// these: no refs times an area without end.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Cut(u64);
+
+impl Cut {
+    const NONE: Cut = Cut((f32::INFINITY.to_bits() as u64) << 32);
+
+    #[inline(always)]
+    fn new(work: f32, axis: usize, bin: usize) -> Cut {
+        Cut(u64::from(work.to_bits()) << 32 | (axis as u64) << 8 | bin as u64)
+    }
+
+    /// The axis and the first bin on the right side, if there is a split.
+    fn plane(self) -> Option<(usize, usize)> {
+        (self < Cut::NONE).then_some((self.0 as usize >> 8 & 3, self.0 as usize & 0xFF))
+    }
+}
+
 /// The bins of the three axes, or of one after the other where room is scarce: scratch for [`best_plane`].
 pub(crate) struct Bins([Axis; AXES]);
 
@@ -199,22 +226,16 @@ pub(crate) fn best_plane(
     if !one_by_one {
         fill(axes, &binning, sample.clone());
     }
-    let mut best = (f32::INFINITY, 0, 0);
+    let mut best = Cut::NONE;
     let widest = centres.widest();
     for k in if one_axis { widest..widest + 1 } else { 0..3 } {
         let Some(axis) = axes.get_mut(k % AXES) else { break };
         if one_by_one {
             axis.fill(&binning, k, sample.clone());
         }
-        let (work, bin) = axis.best(binning.bins, areas);
-        if work < best.0 {
-            best = (work, k, bin);
-        }
+        best = best.min(axis.best(k, binning.bins, areas));
     }
-    let (_, axis, bin) = best;
-    if bin == 0 {
-        return None;
-    }
+    let (axis, bin) = best.plane()?;
     Some(Plane { binning, axis, bin })
 }
 
@@ -254,28 +275,25 @@ impl Axis {
         self.counts[bin % BINS] += 1;
     }
 
-    /// The least work of a split, and the first bin on its right; 0 when there is none.
-    fn best(&self, bins: usize, areas: Areas) -> (f32, usize) {
+    /// The split of least work on axis `k`.
+    fn best(&self, k: usize, bins: usize, areas: Areas) -> Cut {
         let bins = bins.min(BINS);
         let (bounds, counts) = (&self.bounds[..bins], &self.counts[..bins]);
         // What lies right of each plane, from the right; then what lies left.
-        let mut right = [(0.0f32, 0u32); BINS];
+        let mut right = [0.0f32; BINS];
         let (mut all, mut count) = (Box4::EMPTY, 0);
         for ((right, one), n) in right.iter_mut().zip(bounds).zip(counts).skip(1).rev() {
             all.add(one);
             count += n;
-            *right = (areas.of_finite(&all) * count as f32, count);
+            *right = areas.of_finite(&all) * count as f32;
         }
         let (mut all, mut count) = (Box4::EMPTY, 0);
-        let mut best = (f32::INFINITY, 0);
-        let planes = right.iter().zip(1..).skip(1).map(|(right, bin)| (right, bin - 1));
-        for ((one, n), ((right_work, right_count), bin)) in bounds.iter().zip(counts).zip(planes) {
+        let mut best = Cut::NONE;
+        for (((one, n), right), bin) in bounds.iter().zip(counts).zip(right.iter().skip(1)).zip(1..)
+        {
             all.add(one);
             count += n;
-            let work = areas.of_finite(&all) * count as f32 + right_work;
-            if count > 0 && *right_count > 0 && work < best.0 {
-                best = (work, bin);
-            }
+            best = best.min(Cut::new(areas.of_finite(&all) * count as f32 + right, k, bin));
         }
         best
     }
