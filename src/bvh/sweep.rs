@@ -29,41 +29,49 @@ pub(crate) fn sweep(
         right.add(&r.bounds);
         *place = right;
     }
-    let mut left = Box4::EMPTY;
-    let mut best: Option<(usize, f32)> = None;
-    for ((r, right), i) in refs.iter().zip(&rights[1..]).zip(1..count) {
+    let (mut left, mut works) = (Box4::EMPTY, [f32::INFINITY; FEW]);
+    for (((r, right), i), work) in refs.iter().zip(&rights[1..]).zip(1..count).zip(&mut works) {
         left.add(&r.bounds);
-        let work = areas.of_finite(&left) * i as f32 + areas.of_finite(right) * (count - i) as f32;
-        if allowed(i) && best.is_none_or(|best| work < best.1) {
-            best = Some((i, work));
-        }
+        *work = areas.of_finite(&left) * i as f32 + areas.of_finite(right) * (count - i) as f32;
     }
-    best.map(|(left_count, work)| Sweep { left_count, work })
+    // The bits of floats that are not negative are in their order.
+    let key = |i: usize| u64::from(works[i - 1].to_bits()) << 8 | i as u64;
+    let all = || 1..count;
+    let least = all().map(key).min().filter(|key| allowed((key & 0xFF) as usize));
+    let least = least.or_else(|| all().filter(|i| allowed(*i)).map(key).min())?;
+    Some(Sweep { left_count: (least & 0xFF) as usize, work: f32::from_bits((least >> 8) as u32) })
 }
 
 /// Sorts by the centres on the axis on which they are furthest apart.
 fn sort(refs: &mut [PrimRef]) {
     let axis = Extent::around(refs).centres.widest() % 4;
-    sort_few(refs, |r| middle(r.bounds.lower[axis], r.bounds.upper[axis]));
+    sort_few(refs, |r| {
+        let bits = middle(r.bounds.lower[axis], r.bounds.upper[axis]).to_bits() as i32;
+        // In the order of the floats, and NaN has a place too.
+        bits ^ (bits >> 31 & i32::MAX)
+    });
 }
 
 /// Sorts up to [`FEW`] refs by their keys; equal ones stay in order.
-pub(super) fn sort_few<K: PartialOrd + Copy>(refs: &mut [PrimRef], key: impl Fn(&PrimRef) -> K) {
-    let Some(first) = refs.first() else { return };
-    let mut order = [(key(first), 0); FEW];
-    for (i, r) in refs.iter().enumerate().take(FEW) {
-        let (mut at, key) = (i, key(r));
-        while at > 0 && key < order[(at - 1) % FEW].0 {
-            order[at % FEW] = order[(at - 1) % FEW];
-            at -= 1;
+///
+/// Each goes behind all that belong before it, which are counted without a branch: nobody could guess it.
+pub(super) fn sort_few(refs: &mut [PrimRef], key: impl Fn(&PrimRef) -> i32) {
+    let mut keys = [i32::MAX; FEW];
+    let mut before = [PrimRef::NONE; FEW];
+    for ((place, key_of_r), r) in before.iter_mut().zip(&mut keys).zip(&*refs) {
+        (*place, *key_of_r) = (*r, key(r));
+    }
+    let mut places = [0; FEW];
+    for i in 1..FEW {
+        for j in 0..i {
+            let stays = usize::from(keys[j] <= keys[i]);
+            places[i] += stays;
+            places[j] += 1 - stays;
         }
-        order[at % FEW] = (key, i);
     }
-    let mut before = [*first; FEW];
-    for (before, r) in before.iter_mut().zip(&*refs) {
-        *before = *r;
-    }
-    for (r, (_, i)) in refs.iter_mut().zip(&order) {
-        *r = before[i % FEW];
+    for (r, place) in before.iter().zip(places).take(refs.len()) {
+        if let Some(to) = refs.get_mut(place) {
+            *to = *r;
+        }
     }
 }

@@ -281,7 +281,7 @@ impl Splitter<'_, '_, '_> {
             None if may_be_leaf => None,
             // Few, but of two kinds: each kind can be one leaf.
             None if SPHERES && count <= leaf_max => {
-                sort_few(refs, |r| (r.is_sphere(), r.id()));
+                sort_few(refs, |r| (i32::from(r.is_sphere()) << 30) | r.id() as i32);
                 Some(Place { left_count: count - spheres, by_kind: true })
             }
             None => Some(at(count / 2)),
