@@ -52,6 +52,16 @@ impl TriangleBlock {
         reserved: 0,
     };
 
+    /// Empties the block. Part by part: a record would be put together elsewhere and copied, or stand in the program.
+    #[inline(always)]
+    pub fn clear(&mut self, first: u32) {
+        self.vertices = [[0.0; TRIANGLES]; 3];
+        self.corners = [[0; TRIANGLES / 2]; 3];
+        (self.first, self.count) = (first, 0);
+        self.aabb = Aabb::EMPTY;
+        (self.live, self.reserved) = (0, 0);
+    }
+
     /// The vertices of triangle `i < 16`, whatever the block holds.
     #[cfg_attr(target_os = "none", inline(never))]
     #[cfg_attr(not(target_os = "none"), inline(always))]

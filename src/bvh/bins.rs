@@ -166,30 +166,39 @@ impl Plane {
     }
 }
 
-/// A place between two bins, and the work of a split there, in one number: the least is the first of those of the least work, and finding it
-/// takes no branch, which would be guessed wrong.
-///
-/// ```text
-/// bit 0     8      16        32
-///     | bin | axis | nothing | work |
-/// ```
+/// A place between two bins, and the work of a split there. The least is found without a branch, which would be guessed wrong.
 ///
 /// The bits of floats that are not negative are in their order; infinity and NaN come last. The work of a side without refs is one of
 /// these: no refs times an area without end.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Cut(u64);
+#[derive(Clone, Copy)]
+struct Cut {
+    work: u32,
+    /// The axis above eight bits of the bin.
+    place: u32,
+}
 
 impl Cut {
-    const NONE: Cut = Cut((f32::INFINITY.to_bits() as u64) << 32);
+    const NONE: Cut = Cut { work: f32::INFINITY.to_bits(), place: 0 };
 
     #[inline(always)]
-    fn new(work: f32, axis: usize, bin: usize) -> Cut {
-        Cut(u64::from(work.to_bits()) << 32 | (axis as u64) << 8 | bin as u64)
+    fn new(work: f32, axis: usize, bin: u32) -> Cut {
+        Cut { work: work.to_bits(), place: (axis as u32) << 8 | bin }
+    }
+
+    /// The one of less work, or else the first.
+    #[inline(always)]
+    fn min(self, other: Cut) -> Cut {
+        let less = other.work < self.work;
+        Cut {
+            work: if less { other.work } else { self.work },
+            place: if less { other.place } else { self.place },
+        }
     }
 
     /// The axis and the first bin on the right side, if there is a split.
     fn plane(self) -> Option<(usize, usize)> {
-        (self < Cut::NONE).then_some((self.0 as usize >> 8 & 3, self.0 as usize & 0xFF))
+        let (axis, bin) = (self.place as usize >> 8, self.place as usize & 0xFF);
+        (bin > 0).then_some((axis, bin))
     }
 }
 
@@ -279,7 +288,7 @@ impl Axis {
     fn best(&self, k: usize, bins: usize, areas: Areas) -> Cut {
         let bins = bins.min(BINS);
         let (bounds, counts) = (&self.bounds[..bins], &self.counts[..bins]);
-        // What lies right of each plane, from the right; then what lies left.
+        // What lies right of each plane, from the right; then what lies left. The last bin has no plane behind it.
         let mut right = [0.0f32; BINS];
         let (mut all, mut count) = (Box4::EMPTY, 0);
         for ((right, one), n) in right.iter_mut().zip(bounds).zip(counts).skip(1).rev() {
@@ -289,7 +298,8 @@ impl Axis {
         }
         let (mut all, mut count) = (Box4::EMPTY, 0);
         let mut best = Cut::NONE;
-        for (((one, n), right), bin) in bounds.iter().zip(counts).zip(right.iter().skip(1)).zip(1..)
+        for (((one, n), right), bin) in
+            bounds.iter().zip(counts).zip(right[..bins].iter().skip(1)).zip(1..)
         {
             all.add(one);
             count += n;

@@ -64,7 +64,10 @@ pub(super) fn name_ids(ids: &mut [u32], free: &[u8], caller: &Caller) -> Option<
     }
     caller.for_each(&mut parts, |part| {
         let Some((ids, named)) = part else { return };
-        *named = ids.iter_mut().try_for_each(|id| Some(*id = *order.get(*id as usize)?));
+        *named = ids.iter_mut().try_for_each(|id| {
+            *id = *order.get(*id as usize)?;
+            Some(())
+        });
     });
     parts.iter().flatten().try_for_each(|(_, named)| *named)
 }

@@ -29,17 +29,28 @@ pub(crate) fn sweep(
         right.add(&r.bounds);
         *place = right;
     }
-    let (mut left, mut works) = (Box4::EMPTY, [f32::INFINITY; FEW]);
+    // The bits of floats that are not negative are in their order.
+    let (mut left, mut works) = (Box4::EMPTY, [u32::MAX; FEW]);
     for (((r, right), i), work) in refs.iter().zip(&rights[1..]).zip(1..count).zip(&mut works) {
         left.add(&r.bounds);
-        *work = areas.of_finite(&left) * i as f32 + areas.of_finite(right) * (count - i) as f32;
+        let sum = areas.of_finite(&left) * i as f32 + areas.of_finite(right) * (count - i) as f32;
+        *work = sum.to_bits();
     }
-    // The bits of floats that are not negative are in their order.
-    let key = |i: usize| u64::from(works[i - 1].to_bits()) << 8 | i as u64;
-    let all = || 1..count;
-    let least = all().map(key).min().filter(|key| allowed((key & 0xFF) as usize));
-    let least = least.or_else(|| all().filter(|i| allowed(*i)).map(key).min())?;
-    Some(Sweep { left_count: (least & 0xFF) as usize, work: f32::from_bits((least >> 8) as u32) })
+    // Almost always the first is allowed.
+    loop {
+        let (mut least, mut at) = (u32::MAX, 0);
+        for (work, i) in works.iter().zip(0..) {
+            (least, at) = if *work < least { (*work, i) } else { (least, at) };
+        }
+        let left_count = at + 1;
+        if least == u32::MAX {
+            return None;
+        }
+        if allowed(left_count) {
+            return Some(Sweep { left_count, work: f32::from_bits(least) });
+        }
+        *works.get_mut(at)? = u32::MAX;
+    }
 }
 
 /// Sorts by the centres on the axis on which they are furthest apart.
@@ -61,16 +72,16 @@ pub(super) fn sort_few(refs: &mut [PrimRef], key: impl Fn(&PrimRef) -> i32) {
     for ((place, key_of_r), r) in before.iter_mut().zip(&mut keys).zip(&*refs) {
         (*place, *key_of_r) = (*r, key(r));
     }
-    let mut places = [0; FEW];
-    for i in 1..FEW {
-        for j in 0..i {
-            let stays = usize::from(keys[j] <= keys[i]);
+    let mut places = [0u8; FEW];
+    for (i, key) in keys.iter().enumerate() {
+        for (j, other) in keys.iter().enumerate().take(i) {
+            let stays = u8::from(other <= key);
             places[i] += stays;
             places[j] += 1 - stays;
         }
     }
     for (r, place) in before.iter().zip(places).take(refs.len()) {
-        if let Some(to) = refs.get_mut(place) {
+        if let Some(to) = refs.get_mut(usize::from(place)) {
             *to = *r;
         }
     }

@@ -334,6 +334,7 @@ impl Splitter<'_, '_, '_> {
     }
 
     /// Whether leaves and levels last for these sides.
+    #[cfg_attr(target_os = "none", inline(never))]
     fn lasts(self, task: &Task, counts: [usize; 2]) -> bool {
         let [left, right] = self.fewest(counts);
         let levels = levels_to_halve(counts[0].max(counts[1]), self.limits.leaf_max);

@@ -122,10 +122,7 @@ impl<'b> Packer<'b> {
                     || fill.vertices + 3 <= TRIANGLES + corners.iter().map(known).sum::<usize>())
         });
         if !fits {
-            let block = self.triangle_blocks.get_mut(fill.blocks)?;
-            // Not as one record, which would be put together elsewhere and copied.
-            *block = TriangleBlock::EMPTY;
-            block.first = fill.next_id;
+            self.triangle_blocks.get_mut(fill.blocks)?.clear(fill.next_id);
             self.numbers = Numbers::NONE;
             fill.blocks += 1;
             fill.vertices = 0;

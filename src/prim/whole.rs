@@ -34,9 +34,8 @@ impl<'s, 'a> BlockWriter<'s, 'a> {
             return None;
         }
         let (count, live) = (ids.len() as u32, low_bits(ids.len() as u32));
-        // Not as one record, which would be put together elsewhere and copied.
-        *block = TriangleBlock::EMPTY;
-        (block.first, block.count, block.live) = (first, count, live);
+        block.clear(first);
+        (block.count, block.live) = (count, live);
         self.numbers = Numbers::NONE;
         self.known.forget();
         let (mut corners, mut vertices) = ([0u64; 3], 0);
