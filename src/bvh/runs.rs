@@ -72,9 +72,9 @@ pub(super) fn name_ids(ids: &mut [u32], free: &[u8], caller: &Caller) -> Option<
     parts.iter().flatten().try_for_each(|(_, named)| *named)
 }
 
-/// Runs end with every so many refs.
+/// Runs end with every so many refs: so no run depends on what was seen of the ones before.
 const PART: usize = 512;
-/// With every so many, nothing is known of the ones before: what is shared out are multiples of these.
+/// What is shared out are multiples of these.
 const PIECE: usize = 8 * PART;
 
 /// Refs, and the vertices of refs, are fetched so far ahead.
@@ -119,9 +119,6 @@ impl Cutting<'_, '_, '_> {
         let mut part = Part { refs: [PrimRef::NONE; PART], fresh: [0; PART], count: 0 };
         let mut cut = Cut::default();
         for start in (0..keys.len()).step_by(PART) {
-            if start % PIECE == 0 {
-                seen = Seen::NOTHING;
-            }
             part.read(self.refs, keys.get_mut(start..).unwrap_or_default(), &mut shapes, &mut seen);
             let mut at = 0;
             while at < part.count {
