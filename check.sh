@@ -155,7 +155,10 @@ step_compare() {
 }
 
 # The comparison with Embree, cut short: its answers are checked, its times mean nothing here.
-step_bench() { tool raykern-bench --quick; }
+step_bench() {
+    tool raykern-bench --quick
+    tool raykern-bench --builds --quick --runs 1
+}
 
 # Every method on ordinary rays and stress families, every answer judged, and the page.
 step_report() { tool report --quick --out "$built/report-check"; }
