@@ -168,8 +168,21 @@ fn set(word: &AtomicU32, bit: u32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+
+    /// So many tasks at once, one after the other.
+    pub(crate) struct Tasks(pub usize);
+
+    impl Threads for Tasks {
+        fn worker_count(&self) -> usize {
+            self.0
+        }
+
+        fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+            (0..count).rev().for_each(task);
+        }
+    }
 
     /// Runs tasks in an order of its own: backwards, some twice, some not at all.
     struct Odd;

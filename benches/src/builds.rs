@@ -20,11 +20,19 @@ const IMAGINED: [usize; 3] = [4, 8, 16];
 /// Something that is built.
 pub struct Builder {
     pub name: String,
-    /// The seconds that a build takes by so many threads; `None` when it fails.
-    #[allow(clippy::type_complexity, reason = "said once, and read where it is called")]
-    pub build: Box<dyn Fn(&Model, usize) -> Option<f64>>,
-    /// The same by many threads, from how long its tasks take one after the other.
-    pub imagined: Option<fn(&Model) -> [f64; IMAGINED.len()]>,
+    pub build: Build,
+    /// What it is, if it is ours: then more threads can be imagined.
+    pub ours: Option<Way>,
+}
+
+/// The seconds that a build takes by so many threads; `None` when it fails.
+pub type Build = Box<dyn Fn(&Model, usize) -> Option<f64>>;
+
+/// What is built of ours.
+#[derive(Clone, Copy)]
+pub enum Way {
+    Bvh(Quality),
+    Grid,
 }
 
 /// Measures the scenes that are asked for.
@@ -32,10 +40,10 @@ pub fn run(options: &Options) -> Result<()> {
     let threads = options.thread_count();
     println!("BUILDS: nanoseconds a triangle of wall time, by one thread and by {threads}.");
     println!("For {IMAGINED:?} threads worked out from the time of each task.\n");
-    let mut builders = ours(threads)?;
+    let builders = ours(threads)?.into_iter();
     #[cfg(feature = "embree")]
-    builders.extend(crate::embree::builders());
-    builders.retain(|builder| !builder.name.starts_with("embree") || wanted(options, builder));
+    let builders = builders.chain(crate::embree::builders(options));
+    let builders: Vec<_> = builders.collect();
     for case in scenes::cases(options).iter().filter(|case| !case.fixed_cost) {
         match case.load(options) {
             Ok(scene) => measure(&builders, &scene.model, (&case.name, threads), options)
@@ -44,16 +52,6 @@ pub fn run(options: &Options) -> Result<()> {
         }
     }
     Ok(())
-}
-
-#[cfg(any(feature = "embree", feature = "peers"))]
-fn wanted(options: &Options, builder: &Builder) -> bool {
-    options.wants_peer(&builder.name)
-}
-
-#[cfg(not(any(feature = "embree", feature = "peers")))]
-fn wanted(_: &Options, _: &Builder) -> bool {
-    false
 }
 
 fn measure(
@@ -80,8 +78,8 @@ fn measure(
         let each = |seconds: f64| 1e9 * seconds / triangles as f64;
         let [one, several] = seconds.each_ref().map(|seconds| each(median(seconds)));
         print!("  {:<24}{one:>8.1}{several:>8.1}{:>9.2}", builder.name, one / several);
-        if let Some(imagined) = builder.imagined {
-            let [a, b, c] = imagined(model).map(each);
+        if let Some(way) = builder.ours {
+            let [a, b, c] = imagine(model, way).map(each);
             print!("{a:>12.1}{b:>8.1}{c:>8.1}");
         }
         println!();
@@ -95,27 +93,21 @@ fn ours(threads: usize) -> Result<Vec<Builder>> {
     let pools: Result<Vec<_>, _> =
         [1, threads].map(|n| ThreadPoolBuilder::new().num_threads(n).build()).into_iter().collect();
     let pools: &'static [ThreadPool] = Vec::leak(pools?);
-    let builder = |name: &str, way: Way, imagined| Builder {
+    let builder = |(name, way): (&str, Way)| Builder {
         name: name.to_string(),
         build: Box::new(move |model, count| {
             let pool = &pools[usize::from(count > 1)];
             Some(pool.install(|| build(model, way, &Rayon)))
         }),
-        imagined: Some(imagined),
+        ours: Some(way),
     };
-    Ok(vec![
-        builder("bvh", Way::Bvh(Quality::Balanced), |m| imagine(m, Way::Bvh(Quality::Balanced))),
-        builder("bvh-fast", Way::Bvh(Quality::Fast), |m| imagine(m, Way::Bvh(Quality::Fast))),
-        builder("bvh-best", Way::Bvh(Quality::Best), |m| imagine(m, Way::Bvh(Quality::Best))),
-        builder("grid", Way::Grid, |m| imagine(m, Way::Grid)),
-    ])
-}
-
-/// What is built of ours.
-#[derive(Clone, Copy)]
-enum Way {
-    Bvh(Quality),
-    Grid,
+    let ways = [
+        ("bvh", Way::Bvh(Quality::Balanced)),
+        ("bvh-fast", Way::Bvh(Quality::Fast)),
+        ("bvh-best", Way::Bvh(Quality::Best)),
+        ("grid", Way::Grid),
+    ];
+    Ok(ways.map(builder).into())
 }
 
 /// The seconds of a build.

@@ -201,8 +201,9 @@ fn timed_scene(model: &Model, way: Way) -> (Option<Scene>, f64) {
 }
 
 /// Every quality, built by the default of instruction sets; without the copying of meshes.
-pub fn builders() -> Vec<Builder> {
-    let builders = SETUPS.iter().filter(|setup| setup.flags == PLAIN).map(|setup| Builder {
+pub fn builders(options: &Options) -> Vec<Builder> {
+    let wanted = |setup: &&Setup| setup.flags == PLAIN && options.wants_peer(setup.name);
+    let builders = SETUPS.iter().filter(wanted).map(|setup| Builder {
         name: setup.name.to_string(),
         build: Box::new(|model, threads| {
             let config = CString::new(format!("threads={threads},start_threads=1")).ok()?;
@@ -211,7 +212,7 @@ pub fn builders() -> Vec<Builder> {
             let failed = scene.commit();
             (!failed).then(|| started.elapsed().as_secs_f64())
         }),
-        imagined: None,
+        ours: None,
     });
     builders.collect()
 }

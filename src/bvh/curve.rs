@@ -167,9 +167,9 @@ fn spread(bits: u64) -> u64 {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::caller::Threads;
+    use crate::caller::tests::Tasks;
     use crate::math::Aabb;
     use raykern_harness::make::Random;
     use std::vec::Vec;
@@ -185,19 +185,6 @@ pub(super) mod tests {
         let (mut keys, mut spare) = (std::vec![0; refs.len()], std::vec![0; refs.len()]);
         let keys = along_curve(&refs, apart, (&mut keys, &mut spare), caller).expect("a curve");
         keys.iter().map(|key| number_of(*key)).collect()
-    }
-
-    /// So many tasks at once, one after the other.
-    pub(in crate::bvh) struct Tasks(pub usize);
-
-    impl Threads for Tasks {
-        fn worker_count(&self) -> usize {
-            self.0
-        }
-
-        fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
-            (0..count).rev().for_each(task);
-        }
     }
 
     #[test]

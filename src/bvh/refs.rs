@@ -269,23 +269,10 @@ fn share_edge(a: &[[f32; 3]; 3], b: &[[f32; 3]; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::caller::Threads;
+    use crate::caller::tests::Tasks;
     use crate::prim::survey;
     use crate::scene::Mesh;
     use std::vec::Vec;
-
-    /// Three tasks at once, one after the other.
-    struct Three;
-
-    impl Threads for Three {
-        fn worker_count(&self) -> usize {
-            3
-        }
-
-        fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
-            (0..count).rev().for_each(task);
-        }
-    }
 
     /// The first id and the number of triangles of each ref over triangles along a band.
     fn strips(indices: &[[u32; 3]], strip: usize, caller: &Caller) -> Vec<[usize; 2]> {
@@ -312,7 +299,7 @@ mod tests {
         );
         let found = strips(&band, 3, &alone);
         assert!(found.contains(&[GRAIN - 1, 1]) && found.contains(&[GRAIN, 3]));
-        assert!(strips(&band, 3, &Caller::new(Some(&Three), None)) == found, "with threads");
+        assert!(strips(&band, 3, &Caller::new(Some(&Tasks(3)), None)) == found, "with threads");
     }
 
     #[test]
@@ -324,6 +311,6 @@ mod tests {
         let found = strips(&band, 4, &Caller::new(None, None));
         assert_eq!(found[..2], [[0, 1], [2, 4]]);
         assert_eq!(found.iter().map(|[_, count]| count).sum::<usize>(), band.len() - 3);
-        assert!(strips(&band, 4, &Caller::new(Some(&Three), None)) == found, "with threads");
+        assert!(strips(&band, 4, &Caller::new(Some(&Tasks(3)), None)) == found, "with threads");
     }
 }

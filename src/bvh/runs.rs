@@ -288,8 +288,8 @@ impl Seen {
 mod tests {
     use super::*;
     use crate::block::Census;
-    use crate::bvh::curve::tests::Tasks;
     use crate::bvh::refs::gather;
+    use crate::caller::tests::Tasks;
     use crate::prim::{Packer, geometry_table, survey};
     use crate::scene::{Mesh, Scene};
     use std::vec::Vec;

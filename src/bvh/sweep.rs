@@ -1,7 +1,7 @@
 //! Where to part the few refs of a small node: SAH over every place between two of them.
 
 use super::refs::PrimRef;
-use super::split::{Areas, Box4, Extent, middle};
+use super::split::{Areas, Box4, Extent, lesser, middle};
 
 /// Of at most this many refs every split along an axis is looked at.
 pub(crate) const FEW: usize = 8;
@@ -29,12 +29,13 @@ pub(crate) fn sweep(
         right.add(&r.bounds);
         *place = right;
     }
-    // The bits of floats that are not negative are in their order.
+    // The bits of floats that are not negative are in their order. What is no number, as it comes of infinite boxes, is infinite: its
+    // bits are not the same on all machines.
     let (mut left, mut works) = (Box4::EMPTY, [u32::MAX; FEW]);
     for (((r, right), i), work) in refs.iter().zip(&rights[1..]).zip(1..count).zip(&mut works) {
         left.add(&r.bounds);
         let sum = areas.of_finite(&left) * i as f32 + areas.of_finite(right) * (count - i) as f32;
-        *work = sum.to_bits();
+        *work = lesser(sum, f32::INFINITY).to_bits();
     }
     // Almost always the first is allowed.
     loop {
@@ -42,10 +43,10 @@ pub(crate) fn sweep(
         for (work, i) in works.iter().zip(0..) {
             (least, at) = if *work < least { (*work, i) } else { (least, at) };
         }
-        let left_count = at + 1;
         if least == u32::MAX {
             return None;
         }
+        let left_count = at + 1;
         if allowed(left_count) {
             return Some(Sweep { left_count, work: f32::from_bits(least) });
         }
