@@ -163,6 +163,8 @@ int main(void) {
             CHECK(calls >= 1);
             if (status == RT_OK) break;
             CHECK(status == RT_ERROR_CANCELLED && calls == allowed + 1 && out == NULL);
+            // Not even one that was finished is left.
+            CHECK(rt_accel_open(memory, need.size, &out) == RT_ERROR_NOT_A_BLOCK && out == NULL);
         }
         CHECK(told == 1.0f && allowed >= 3);
         CHECK(memcmp(alone, out, rt_accel_size(alone)) == 0);

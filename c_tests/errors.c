@@ -3,6 +3,8 @@
 
 #include "check.h"
 
+#include <math.h>
+
 static float vertices[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
 static uint32_t indices[4] = {0, 1, 2, 0};
 static RtMesh mesh;
@@ -100,6 +102,9 @@ static void check_builds(void) {
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.struct_size = offsetof(RtBuildOptions, grid_kind) - 1);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_kind = 3);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_density = -1.0f);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_density = 64.5f);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_density = (float)NAN);
+    REFUSED(RT_ERROR_INVALID_ARGUMENT, options.grid_depth = 9);
     REFUSED(RT_ERROR_INVALID_ARGUMENT, options.rays_per_prim = -1.0f);
 
     // A newer caller: accepted while what we do not know is zero, alone and in arrays.
@@ -146,6 +151,15 @@ static void open_with(RtStatus status, const RtAccel *accel, size_t offset, unsi
     seen[status] = true;
 }
 
+// Of the options of a refit only the threads are read.
+static void check_refit_options(unsigned char *memory, size_t size) {
+    options.quality = 99;
+    options.grid_density = -1.0f;
+    CHECK(rt_accel_refit_with(memory, size, &scene, &options) == RT_OK);
+    options.struct_size = 1;
+    CHECK(rt_accel_refit_with(memory, size, &scene, &options) == RT_ERROR_INVALID_ARGUMENT);
+}
+
 static void check_refit(void) {
     RtMemory need;
     const RtAccel *out;
@@ -159,6 +173,7 @@ static void check_refit(void) {
         const RtStatus status = refit ? RT_ERROR_OTHER_SCENE : RT_ERROR_NOT_REFITTABLE;
         CHECK(rt_accel_refit(memory, need.size, &empty) == status);
         seen[status] = true;
+        if (refit) check_refit_options(memory, need.size);
     }
 }
 
@@ -242,6 +257,50 @@ static void check_open_and_queries(void) {
     CHECK(memcmp(accel, out, size) == 0);
 }
 
+// A ray and its hit in one place, and side by side.
+typedef union Slot { RtRay ray; RtHit hit; } Slot;
+typedef struct Pair { RtHit hit; RtRay ray; } Pair;
+#define RAYS 300
+
+// Answers may come where they are in nobody's way; all else that overlaps is refused.
+static void check_overlaps(void) {
+    const RtAccel *accel = built(&scene, false, NULL);
+    static RtRay rays[RAYS];
+    static RtHit hits[RAYS];
+    static Slot slots[RAYS + 1], same[RAYS + 1];
+    static Pair pairs[RAYS];
+    for (int i = 0; i < RAYS; i++) {
+        RtRay ray = {{0.25f, 0.25f, (float)(1 + i)}, 0, {0, i % 3 ? -1.0f : 1.0f, -1}, 1e30f};
+        rays[i] = slots[i].ray = pairs[i].ray = ray;
+    }
+    slots[RAYS] = slots[0];
+    memcpy(same, slots, sizeof same);
+    rt_intersect_batch(accel, rays, hits, RAYS);
+    RtRay *first = &slots[0].ray;
+    char *bytes = (char *)slots;
+    const struct { size_t at, hit_stride; } refused[] = {
+        {0, 0}, {0, 36}, {0, 24}, {sizeof(Slot), sizeof(Slot)}, {12, sizeof(Slot)}, {sizeof(Slot) - 4, sizeof(Slot)},
+    };
+    for (size_t i = 0; i < sizeof refused / sizeof refused[0]; i++) {
+        RtHit *out = (RtHit *)(void *)(bytes + refused[i].at);
+        CHECK(rt_intersect_batch_with(accel, first, 0, NULL, out, refused[i].hit_stride, RAYS) == RT_ERROR_INVALID_ARGUMENT);
+    }
+    CHECK(rt_occluded_batch_with(accel, first, 0, NULL, (uint8_t *)(bytes + 64), 0, RAYS) == RT_ERROR_INVALID_ARGUMENT);
+    rt_intersect_batch(accel, first, (RtHit *)(void *)bytes, RAYS);
+    CHECK(memcmp(slots, same, sizeof same) == 0);
+
+    CHECK(rt_intersect_batch_with(accel, first, 0, NULL, (RtHit *)(void *)(bytes + 8), sizeof(Slot), RAYS) == RT_OK);
+    for (int i = 0; i < RAYS; i++) CHECK(memcmp((char *)&slots[i] + 8, &hits[i], sizeof(RtHit)) == 0);
+    memcpy(slots, same, sizeof same);
+    CHECK(rt_intersect_batch_with(accel, first, 0, NULL, &slots[0].hit, sizeof(Slot), RAYS) == RT_OK);
+    for (int i = 0; i < RAYS; i++) CHECK(memcmp(&slots[i].hit, &hits[i], sizeof(RtHit)) == 0);
+    CHECK(rt_intersect_batch_with(accel, &pairs[0].ray, sizeof(Pair), NULL, &pairs[0].hit, sizeof(Pair), RAYS) == RT_OK);
+    for (int i = 0; i < RAYS; i++) CHECK(memcmp(&pairs[i].hit, &hits[i], sizeof(RtHit)) == 0);
+    memcpy(slots, same, sizeof same);
+    CHECK(rt_occluded_batch_with(accel, first, 0, NULL, (uint8_t *)bytes + 31, sizeof(Slot), RAYS) == RT_OK);
+    for (int i = 0; i < RAYS; i++) CHECK(((uint8_t *)&slots[i])[31] == (hits[i].prim != RT_NONE));
+}
+
 // Sentences are told apart by their place alone.
 static void check_words(void) {
     const struct { RtStatus status; const char *word; } said[] = {
@@ -259,6 +318,7 @@ int main(void) {
     check_memory();
     check_refit();
     check_open_and_queries();
+    check_overlaps();
     // 4 is no status.
     for (RtStatus i = RT_OK + 1; i < RT_ERROR_INTERNAL; i++) CHECK(seen[i] || i == 4);
     for (RtStatus i = RT_ERROR_NOT_REFITTABLE; i <= RT_ERROR_LINKED; i++) CHECK(seen[i]);

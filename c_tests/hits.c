@@ -140,7 +140,11 @@ static void check_spheres(void) {
     cursor.t = 4;
     cursor.prim = 1;
     cursor.instance = RT_NONE;
+    RtCursor other = cursor;
     CHECK(rt_all_hits(accel, &ray, NULL, &cursor, hits, 8) == 2 && hits[0].t == 6);
+    size_t found = 0;
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, &other, hits, 8, &found) == RT_OK && found == 2);
+    CHECK(memcmp(&other, &cursor, sizeof other) == 0 && hits[1].t == 7);
     CHECK(cursor.root == 1 && cursor.prim == 0 && cursor.t == 7);
 
     // Refused: nothing is written.
@@ -157,7 +161,25 @@ static void check_spheres(void) {
     CHECK(rt_all_hits(accel, &ray, NULL, NULL, NULL, 8) == 0);
     CHECK(rt_all_hits(accel, &ray, NULL, NULL, hits, (size_t)-1) == 0);
     CHECK(rt_all_hits(accel, &ray, NULL, NULL, hits, 0) == 0);
+    size_t count = 77;
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, NULL, hits, 8, NULL) == RT_ERROR_NULL_POINTER);
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, NULL, NULL, 8, &count) == RT_ERROR_NULL_POINTER);
+    CHECK(rt_all_hits_checked(accel, &ray, &query, NULL, hits, 8, &count) == RT_ERROR_INVALID_ARGUMENT);
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, NULL, hits, (size_t)-1, &count) == RT_ERROR_TOO_LARGE);
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, &cursor, hits, 8, &count) == RT_ERROR_INVALID_ARGUMENT);
+    CHECK(memcmp(&same, &cursor, sizeof same) == 0);
+    cursor.struct_size = same.struct_size = sizeof cursor;
+    cursor.begun = same.begun = 1;
+    cursor.prim = same.prim = 5;
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, &cursor, hits, 8, &count) == RT_ERROR_NOT_FOUND && count == 77);
+    CHECK(rt_all_hits(accel, &ray, NULL, &cursor, hits, 8) == 0);
     CHECK(memcmp(&mark, hits, sizeof mark) == 0 && memcmp(&same, &cursor, sizeof same) == 0);
+
+    // After the last one, and with no room, there are none.
+    cursor.prim = 0;
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, &cursor, hits, 0, &count) == RT_OK && count == 0);
+    count = 77;
+    CHECK(rt_all_hits_checked(accel, &ray, NULL, &cursor, hits, 8, &count) == RT_OK && count == 0);
 }
 
 int main(void) {

@@ -548,14 +548,24 @@ RtStatus rt_hit_surface(const RtAccel *accel,
 // whatever `query->precision` is, and the first of all is that of `rt_intersect`. What is in `hits`
 // behind those returned may be written too.
 //
-// 0 when another pointer is null, when query or cursor are refused, as `rt_query_check` would, and
-// when the cursor names a hit that the ray does not have.
+// 0, and nothing written, when another pointer is null, when query or cursor are refused, and when the cursor names a hit that the
+// ray does not have: `rt_all_hits_checked` says which.
 size_t rt_all_hits(const RtAccel *accel,
                    const RtRay *ray,
                    const RtQuery *query,
                    RtCursor *cursor,
                    RtHit *hits,
                    size_t capacity);
+
+// `rt_all_hits` that says why it was refused, and else writes to `*count` how many hits it wrote. RT_ERROR_NOT_FOUND: the ray does
+// not have the hit that the cursor names. When refused, nothing is written.
+RtStatus rt_all_hits_checked(const RtAccel *accel,
+                             const RtRay *ray,
+                             const RtQuery *query,
+                             RtCursor *cursor,
+                             RtHit *hits,
+                             size_t capacity,
+                             size_t *count);
 
 // The point closest to `point`, three floats, on the triangles and the surfaces of spheres within
 // `radius`, ends included; of what the mask and `skip` of `query` leave, which may be null. `skip`
@@ -579,13 +589,14 @@ bool rt_closest_point(const RtAccel *accel,
                       const RtQuery *query,
                       RtPointHit *out);
 
-// `rt_intersect` for `count` rays. When a pointer is null, nothing is written.
+// `rt_intersect` for `count` rays, on the calling thread: parts of an array may be asked for at the same time. When a pointer is null or
+// the arrays overlap, nothing is written; `rt_intersect_batch_with` says so.
 void rt_intersect_batch(const RtAccel *accel,
                         const RtRay *rays,
                         RtHit *hits,
                         size_t count);
 
-// `rt_occluded` for `count` rays: 1 for a hit, 0 for none. When a pointer is null, nothing is
+// `rt_occluded` for `count` rays: 1 for a hit, 0 for none. When a pointer is null or the arrays overlap, nothing is
 // written.
 void rt_occluded_batch(const RtAccel *accel,
                        const RtRay *rays,
@@ -595,6 +606,9 @@ void rt_occluded_batch(const RtAccel *accel,
 // `rt_intersect_with` for `count` rays, `ray_stride` bytes apart, into hits `hit_stride` bytes
 // apart. A stride of 0 means packed; others are multiples of 4 and no less than the struct.
 // `query` may be null. When refused, nothing is written.
+//
+// The arrays do not overlap, or at equal strides each hit lies in the place of its own ray or between two rays; anything else is
+// refused. So hits may take the place of rays, or stand beside them in one struct.
 RtStatus rt_intersect_batch_with(const RtAccel *accel,
                                  const RtRay *rays,
                                  size_t ray_stride,
@@ -604,7 +618,7 @@ RtStatus rt_intersect_batch_with(const RtAccel *accel,
                                  size_t count);
 
 // `rt_occluded_with` for `count` rays, `ray_stride` bytes apart, into bytes `occluded_stride` bytes
-// apart. A stride of 0 means packed. `query` may be null. When refused, nothing is written.
+// apart. A stride of 0 means packed. `query` may be null. When refused, nothing is written. Arrays may overlap as above.
 RtStatus rt_occluded_batch_with(const RtAccel *accel,
                                 const RtRay *rays,
                                 size_t ray_stride,

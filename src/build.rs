@@ -126,7 +126,7 @@ pub fn build_bvh<'m>(
 /// that come later stay whole when there is no more room, those of the deepest grids first; if leaf blocks then do not fit, less
 /// is listed by a quarter, and again; and where the outermost grid has no room it is halved along each axis. The last resort is one
 /// cell. The finished block is [`Accel::block`]; what lies behind it is free again. On an error nothing was
-/// written.
+/// written, unless the build was cancelled.
 pub fn build_grid<'m>(
     scene: &Scene<'_, 'm>,
     options: &BuildOptions,
@@ -364,7 +364,9 @@ impl<'s> Job<'s> {
         let short = BuildError::OutOfMemory { minimum };
         let own_bytes = bytes.get_mut(..room).ok_or(short)?;
         let built = own.run(scene, &caller, own_bytes);
-        caller.done(1.0).ok_or(BuildError::Cancelled)?;
+        if caller.cancelled() {
+            return Err(BuildError::Cancelled);
+        }
         let size = match level {
             Some(level) => level.run(options, built?, bytes),
             None => Some(built?),
@@ -374,6 +376,11 @@ impl<'s> Job<'s> {
         if REFIT && own.census.refit {
             // The scene was checked and the block is whole, so this error does not arise.
             refit::finish(block, scene, &caller).ok_or(BuildError::TooLarge)?;
+        }
+        if caller.done(1.0).is_none() {
+            // It is finished, and nobody shall take it for a block.
+            block.iter_mut().take(ALIGNMENT).for_each(|byte| *byte = 0);
+            return Err(BuildError::Cancelled);
         }
         Ok(block)
     }

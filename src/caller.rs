@@ -24,7 +24,11 @@ pub(crate) const PARTS: usize = 64;
 /// The caller, as a build in progress sees it.
 pub(crate) struct Caller<'a> {
     threads: Option<&'a dyn Threads>,
+    /// How many tasks run at once, at least one.
+    worker_count: usize,
     progress: Option<&'a dyn Fn(f32) -> bool>,
+    /// How much was said to be done.
+    told: Cell<f32>,
     cancelled: Cell<bool>,
 }
 
@@ -33,14 +37,24 @@ impl<'a> Caller<'a> {
         threads: Option<&'a dyn Threads>,
         progress: Option<&'a dyn Fn(f32) -> bool>,
     ) -> Caller<'a> {
-        let lends = |threads: &&dyn Threads| threads.worker_count() > 1;
         // Where a processor cannot tell which task was first, none are lent.
-        let threads = threads.filter(lends).filter(|_| cfg!(target_has_atomic = "32"));
-        Caller { threads, progress, cancelled: Cell::new(false) }
+        let threads = threads.filter(|_| cfg!(target_has_atomic = "32"));
+        // Asked once, as an answer may change.
+        let worker_count = threads.map_or(1, |threads| threads.worker_count().clamp(1, PARTS));
+        let threads = threads.filter(|_| worker_count > 1);
+        Caller {
+            threads,
+            worker_count,
+            progress,
+            told: Cell::new(0.0),
+            cancelled: Cell::new(false),
+        }
     }
 
-    /// Says how much is done, from 0 to 1; `None` when the caller wants no more.
+    /// Says how much is done, from 0 to 1, or no less than before; `None` when the caller wants no more.
     pub fn done(&self, part: f32) -> Option<()> {
+        let part = if part > self.told.get() { part } else { self.told.get() };
+        self.told.set(part);
         let goes_on = !self.cancelled() && self.progress.is_none_or(|progress| progress(part));
         self.cancelled.set(!goes_on);
         goes_on.then_some(())
@@ -60,12 +74,12 @@ impl<'a> Caller<'a> {
 
     /// How many tasks run at once, at most [`PARTS`].
     pub fn worker_count(&self) -> usize {
-        self.threads().map_or(1, |threads| threads.worker_count().min(PARTS))
+        if THREADS { self.worker_count } else { 1 }
     }
 
     /// A good number of parts for the threads there are, at most [`PARTS`].
     pub fn part_count(&self) -> usize {
-        self.threads().map_or(1, |threads| threads.worker_count().saturating_mul(4).min(PARTS))
+        if self.threads().is_some() { (4 * self.worker_count).min(PARTS) } else { 1 }
     }
 
     /// Gives `take` what `work` makes of each part of `0..count`, in order; at most [`PARTS`] of this size.
@@ -207,6 +221,35 @@ pub(crate) mod tests {
             Caller::new(Some(&Odd), None).for_each(&mut items, |item| *item += 1);
             assert!(items.iter().all(|n| *n == 1), "{count}");
         }
+    }
+
+    /// Says every time that there are fewer.
+    struct Fewer(AtomicU32);
+
+    impl Threads for Fewer {
+        fn worker_count(&self) -> usize {
+            3 - self.0.fetch_add(1, Ordering::Relaxed).min(3) as usize
+        }
+
+        fn parallel_for(&self, count: u32, task: &(dyn Fn(u32) + Sync)) {
+            (0..count).for_each(task);
+        }
+    }
+
+    #[test]
+    fn threads_are_counted_once_and_progress_does_not_fall() {
+        let fewer = Fewer(AtomicU32::new(0));
+        let caller = Caller::new(Some(&fewer), None);
+        assert_eq!([caller.worker_count(), caller.worker_count(), caller.part_count()], [3, 3, 12]);
+        let told = Cell::new(0.0);
+        let progress = |part| {
+            assert!(part >= told.get());
+            told.set(part);
+            true
+        };
+        let caller = Caller::new(None, Some(&progress));
+        assert!([0.1, 0.6, 0.1, 0.85].map(|part| caller.done(part)) == [Some(()); 4]);
+        assert!(told.get() == 0.85);
     }
 
     #[test]

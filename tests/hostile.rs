@@ -154,3 +154,18 @@ fn a_tangent_has_two_sides_and_is_skipped_whole() {
         assert_eq!(accel.intersect_with(&ray, &options), None);
     }
 }
+
+/// Where no float is: the sphere's far side is at twice the largest one's distance.
+#[test]
+fn spheres_are_met_beyond_the_largest_float() {
+    let model = Model { meshes: vec![], sphere_sets: vec![vec![[0.0, 3e38, 0.0, 3e38]]] };
+    let all = All::of(&model);
+    for k in 0..3 {
+        // From the centre; across, the far side is within the floats.
+        let way = [0, 1, 2].map(|i| if i == k { 1e38 } else { 0.0 });
+        let ray = Ray::new([0.0, 3e38, 0.0], way).with_limits(2.0, 4.0);
+        assert_eq!(ask(&all, ray).map(|hit| hit.t), Some(3.0), "{k}");
+        let back = Ray::new([0.0, 3e38, 0.0], way.map(|x| -x)).with_limits(2.0, 4.0);
+        assert_eq!(ask(&all, back).map(|hit| hit.t), Some(3.0), "{k}");
+    }
+}

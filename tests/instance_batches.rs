@@ -188,3 +188,30 @@ fn options_hold_in_batches() {
     let distant = camera(64, [5e5, 8e5, 2e6], [0.0; 3], 6.0);
     same_in_a_batch("bvh", &accel, &distant);
 }
+
+/// What is behind the shorter of two slices stays as it was, on every way that a batch may go.
+#[test]
+fn a_batch_ends_with_the_shorter_slice() {
+    let models = [mixed(1), make::soup(40, 3).into()];
+    let children: Vec<_> = models.iter().map(built).collect();
+    let accels: Vec<_> = children.iter().map(OwnedAccel::accel).collect();
+    let instances = field(&accels, 20, 1.7);
+    let structures = All::build(&Scene::new(&[], &[]).with_instances(&instances));
+    let strewn = strewn_rays(500, [12.0, 2.0, 12.0]);
+    let alike = camera(32, [0.5, 8.0, 30.0], [0.0; 3], 12.0);
+    let mark = Hit { t: 7.0, ..Hit::MISS };
+    for (name, accel) in &structures.accels()[..] {
+        for rays in [&strewn, &alike] {
+            for (given, room) in [(12, 20), (0, 5), (128, 140), (140, 300), (20, 12), (300, 140)] {
+                let (mut hits, mut any) = (vec![mark; room], vec![true; room]);
+                accel.intersect_batch(&rays[..given], &mut hits);
+                accel.occluded_batch(&rays[..given], &mut any);
+                for i in 0..room {
+                    let hit = if i < given { accel.intersect(&rays[i]) } else { Some(mark) };
+                    assert_eq!(hits[i], hit.unwrap_or(Hit::MISS), "{name} {given} {room} {i}");
+                    assert_eq!(any[i], hit.is_some(), "{name} {given} {room} {i}");
+                }
+            }
+        }
+    }
+}

@@ -142,6 +142,40 @@ fn needs_is_enough_and_the_minimum_too() {
 }
 
 /// A packed block holds each child once, stands alone, can be copied and opened, and answers as before.
+/// Balls around long boxes reach further than these.
+#[test]
+fn needs_is_enough_for_grids_over_poles() {
+    let pole = [[[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.0, 0.0, 30.0]]];
+    let meshes = [Mesh::soup(&pole)];
+    let child =
+        OwnedAccel::bvh(&Scene::new(&meshes, &[]), &BuildOptions::default()).expect("a list");
+    let child = child.accel();
+    let at =
+        |x: usize, y: usize| [1.0, 0.0, 0.0, x as f32, 0.0, 1.0, 0.0, y as f32, 0.0, 0.0, 1.0, 0.0];
+    for side in [1, 2, 8, 30] {
+        let instances: Vec<_> =
+            (0..side * side).map(|i| Instance::new(&child, at(i % side, i / side))).collect();
+        let scene = Scene::new(&[], &[]).with_instances(&instances);
+        for kind in [GridKind::Uniform, GridKind::Nested, GridKind::Octree] {
+            for density in [0.0, 1.0, 8.0, 64.0] {
+                let grid = GridOptions { kind, density, ..Default::default() };
+                let options =
+                    BuildOptions { grid, plain_list: PlainList::Never, ..Default::default() };
+                let needs = raykern::grid_needs(&scene, &options).expect("a size");
+                for size in [needs.size, needs.minimum] {
+                    let mut memory = Memory::new(size);
+                    let built = raykern::build_grid(&scene, &options, memory.get(size));
+                    let accel = built.unwrap_or_else(|e| panic!("{side} {kind:?} {density} {e}"));
+                    let ray = Ray::new([0.001, 0.0, 50.0], [0.0, 0.0, -1.0]);
+                    assert_eq!(accel.intersect(&ray), None);
+                    let ray = Ray::new([0.004, -9.0, 10.0], [0.0, 1.0, 0.0]);
+                    assert_eq!(accel.intersect(&ray).map(|hit| hit.instance), Some(0));
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn packed_blocks_stand_alone() {
     // Which of two children comes first in memory is not the test's to say.

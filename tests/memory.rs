@@ -6,8 +6,8 @@ mod common;
 
 use common::{bits, odd_models};
 use raykern::{
-    Accel, BuildError, BuildOptions, GridKind, GridOptions, Kind, Layout, Memory, OpenError,
-    PlainList, Scene,
+    Accel, BuildError, BuildOptions, GridKind, GridOptions, Kind, Layout, Memory, Mesh, OpenError,
+    PlainList, Quality, Ray, Scene, SphereSet,
 };
 use raykern_harness::make::{self, Random};
 use raykern_harness::model::Model;
@@ -236,6 +236,105 @@ fn wide_layouts_take_what_is_promised() {
                     assert!(size <= 3 * info.size, "{name} {kind}: {size} for {}", info.size);
                 });
             });
+        }
+    }
+}
+
+/// A few large triangles among small ones: what is cut in two takes more leaves.
+#[test]
+fn wide_layouts_are_what_was_asked_for_if_refs_are_cut() {
+    for (count, large) in [(60, 10), (500, 3), (500, 60), (2000, 30), (20_000, 3), (20_000, 300)] {
+        let mut random = Random::new(count as u64);
+        let soup: Vec<_> = (0..count)
+            .map(|i| (if i < large { [0.5; 3] } else { random.point(0.0, 1.0) }, i < large))
+            .collect();
+        let soup: Vec<[[f32; 3]; 3]> = soup
+            .into_iter()
+            .map(|(at, is_large)| {
+                let size = if is_large { 0.5 } else { 0.01 };
+                [0; 3].map(|_| {
+                    let away = random.point(-1.0, 1.0);
+                    [0, 1, 2].map(|k| (at[k] + size * away[k]) as f32)
+                })
+            })
+            .collect();
+        let meshes = [Mesh::soup(&soup)];
+        let scene = Scene::new(&meshes, &[]);
+        for layout in [4, 8, 16].map(Layout::Wide) {
+            for quality in [Quality::Fast, Quality::Balanced, Quality::Best] {
+                let options = BuildOptions { quality, layout, ..BuildOptions::default() };
+                let size = raykern::bvh_needs(&scene, &options).expect("a size").size;
+                let info = with_memory(size, 0, |m| {
+                    raykern::build_bvh(&scene, &options, m).expect("enough").info()
+                });
+                assert_eq!(info.layout, layout, "{count} {large} {quality:?}");
+            }
+        }
+    }
+}
+
+/// Loose triangles whose halves, and halves of these, are so many that leaves come out with three or less.
+#[test]
+fn wide_layouts_are_what_was_asked_for_over_lattices() {
+    let corner = |x: f32, y: f32, z: f32| [[x, y, z], [x + 0.1, y, z], [x, y + 0.1, z + 0.1]];
+    for count in [6, 7, 12, 24, 96, 500, 2000, 6000] {
+        let cube = (f64::from(count).cbrt().ceil() as u32).max(1);
+        let square = (f64::from(count).sqrt().ceil() as u32).max(1);
+        let place = |i: u32, n: u32| [i % n, i / n % n, i / n / n].map(|x| 2.0 * x as f32);
+        let of = |n: u32| -> Vec<_> {
+            (0..count).map(|i| place(i, n)).map(|[x, y, z]| corner(x, y, z)).collect()
+        };
+        let line: Vec<_> =
+            (0..count).map(|i| corner(1.5f32.powi(i as i32 % 90), 0.0, 0.0)).collect();
+        // A sheet of which each triangle has vertices of its own, which are told apart where it moves.
+        let sheet: Vec<_> = (0..count)
+            .map(|i| (i % 2, place(i / 2, square)))
+            .map(|(odd, [x, y, _])| match odd {
+                0 => [[x, y, 0.0], [x + 2.0, y, 0.0], [x + 2.0, y + 2.0, 0.0]],
+                _ => [[x, y, 0.0], [x + 2.0, y + 2.0, 0.0], [x, y + 2.0, 0.0]],
+            })
+            .collect();
+        let balls: Vec<_> =
+            (0..count / 3).map(|i| place(i, cube)).map(|[x, y, z]| [x, y, z, 0.2]).collect();
+        for (name, triangles) in
+            [("cube", of(cube)), ("square", of(square)), ("line", line), ("sheet", sheet)]
+        {
+            let meshes = [Mesh::soup(&triangles)];
+            let balls = [SphereSet::new(&balls)];
+            for (sets, quality, refit, width) in
+                (0..36).map(|i| (i % 2, i / 2 % 3, i / 6 % 2, i / 12))
+            {
+                let scene = Scene::new(&meshes, &balls[..sets]);
+                let quality = [Quality::Fast, Quality::Balanced, Quality::Best][quality];
+                let layout = Layout::Wide([4, 8, 16][width]);
+                let plain_list = PlainList::Never;
+                let options = BuildOptions {
+                    quality,
+                    refit: refit == 1,
+                    layout,
+                    plain_list,
+                    ..Default::default()
+                };
+                let Memory { size, minimum, .. } =
+                    raykern::bvh_needs(&scene, &options).expect("a size");
+                // Of many, only the ones that were promised something.
+                for part in if count > 1000 { 4..=4 } else { 0..=4 } {
+                    let given =
+                        if part == 4 { size } else { minimum + (size - minimum) / 4 * part };
+                    let info = with_memory(given, 0, |m| {
+                        let accel = raykern::build_bvh(&scene, &options, m).expect("enough");
+                        assert!(Accel::open(accel.block()).is_ok());
+                        let [x, y, z] = triangles[count as usize / 2][0];
+                        let ray = Ray::new([x + 0.03, y + 0.02, z - 1.0], [0.0, 0.0, 1.0]);
+                        // Some are too far out for so small a step.
+                        let is_met = name == "line" || accel.intersect(&ray).is_some();
+                        assert!(is_met, "{name} {count}");
+                        accel.info()
+                    });
+                    let is_asked_for = part < 4 || info.layout == layout;
+                    assert!(is_asked_for, "{name} {count} {sets} {quality:?} {refit} {layout:?}");
+                }
+            }
         }
     }
 }

@@ -8,8 +8,8 @@ mod motion;
 
 use common::{bits, choose_backend, odd_models};
 use raykern::{
-    Accel, AccelMut, BuildOptions, Counts, Hit, Info, Layout, Mesh, OwnedAccel, PlainList, Quality,
-    QueryOptions, Ray, RefitError, Scene, Strided, Threads, bvh_needs,
+    Accel, AccelMut, BuildOptions, Counts, Hit, Info, Instance, Layout, Mesh, OwnedAccel,
+    PlainList, Quality, QueryOptions, Ray, RefitError, Scene, Strided, Threads, bvh_needs,
 };
 use raykern_harness::make;
 use raykern_harness::model::Model;
@@ -371,6 +371,42 @@ fn threads_do_not_change_the_bytes() {
         let alone = block(None);
         for workers in [2, 3, 16] {
             assert!(block(Some(&Backwards(workers))) == alone, "{kind} {workers}");
+        }
+    }
+}
+
+/// Of a child that moves, a part may have nothing in it that can be hit: as the first of its root, or as any.
+#[test]
+fn instances_show_what_is_left_of_a_child() {
+    let at = |x: f32| {
+        (0..40)
+            .map(move |y| [[x, 0.0], [x + 1.0, 0.0], [x, 1.0]].map(|[x, z]| [x, y as f32 + z, 0.0]))
+    };
+    let there: Vec<_> = [-100.0, 0.0, 100.0].into_iter().flat_map(at).collect();
+    let one = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let turned = [0.0, -2.0, 0.0, 7.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0];
+    for (name, options) in all_options() {
+        for (gone, kept) in [(-100.0, [0.0, 100.0]), (0.0, [-100.0, 100.0]), (100.0, [-100.0, 0.0])]
+        {
+            let left = |t: &[[f32; 3]; 3]| if t[0][0] == gone { [[f32::NAN; 3]; 3] } else { *t };
+            let moved: Vec<_> = there.iter().map(left).collect();
+            let (before, after) = ([Mesh::soup(&there)], [Mesh::soup(&moved)]);
+            let mut child = OwnedAccel::bvh(&Scene::new(&before, &[]), &options).expect("a child");
+            child.refit(&Scene::new(&after, &[]), None).expect("the same scene");
+            let child = child.accel();
+            let instances = [one, turned, one].map(|map| Instance::new(&child, map));
+            for count in 1..=instances.len() {
+                let scene = Scene::new(&[], &[]).with_instances(&instances[..count]);
+                let structures = common::All::build(&scene);
+                for x in kept {
+                    let ray = Ray::new([x + 0.25, 0.25, 9.0], [0.0, 0.0, -1.0]);
+                    let hit = common::agreed(&structures.accels(), &ray, &QueryOptions::default());
+                    assert_eq!(hit.map(|hit| hit.t), Some(9.0), "{name} {gone} {x}");
+                }
+                let ray = Ray::new([gone + 0.25, 0.25, 9.0], [0.0, 0.0, -1.0]);
+                let hit = common::agreed(&structures.accels(), &ray, &QueryOptions::default());
+                assert_eq!(hit, None, "{name} {gone}");
+            }
         }
     }
 }

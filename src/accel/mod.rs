@@ -61,7 +61,8 @@ impl<'m> Accel<'m> {
     /// # Safety
     ///
     /// `block` is the first byte of such a block, which nobody writes to during `'m`.
-    #[cfg(all(feature = "capi", not(test)))]
+    #[cfg(feature = "capi")]
+    #[cfg_attr(test, allow(dead_code, reason = "unit tests have no entry points"))]
     #[allow(unsafe_code, reason = "C passes a pointer to the block and nothing else")]
     #[inline(always)]
     pub(crate) unsafe fn from_ptr(block: *const u8) -> Option<Accel<'m>> {
@@ -289,6 +290,17 @@ impl<'m> Accel<'m> {
         last: &mut Option<HitKey>,
         hits: &mut [Hit],
     ) -> usize {
+        self.hits_after(ray, options, last, hits).unwrap_or(0)
+    }
+
+    /// The same; `None` when the ray does not meet `last`: then nothing is written.
+    pub(crate) fn hits_after(
+        &self,
+        ray: &Ray,
+        options: &QueryOptions,
+        last: &mut Option<HitKey>,
+        hits: &mut [Hit],
+    ) -> Option<usize> {
         hits::fill(self.0, ray, options, last, hits)
     }
 

@@ -6,7 +6,7 @@ use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::leaf::{KIND_TRIANGLES, LeafRef, TriangleBlock, block_ref};
 use crate::bvh::{Columns, ENOUGH_ROOM, Walk};
 use crate::math::Bits;
-use crate::math::rounding::{f32_above, f32_below};
+use crate::math::rounding::{LOOSE, f32_above, f32_below};
 use crate::prim::Leaves;
 use crate::query::{Exact, Query};
 use crate::ray::{Alike, Entered, GROUPS, RayPacket, Sixteen};
@@ -265,8 +265,8 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
                 self.met[group] |= 1 << lane;
                 self.firsts[group].blocks[lane] = leaf.block;
                 self.firsts[group].lanes[lane] = leaf.lanes;
-                self.near[group][lane] = f32_below(near - near.abs() * 1e-12);
-                self.packet.group(group).high[lane] = f32_above(far + far.abs() * 1e-12);
+                self.near[group][lane] = f32_below(near - near.abs() * LOOSE);
+                self.packet.group(group).high[lane] = f32_above(far + far.abs() * LOOSE);
             }
         }
     }

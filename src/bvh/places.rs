@@ -38,6 +38,12 @@ impl Places {
         places.fitting(room, leaves, size)
     }
 
+    /// The places for so many leaves.
+    pub fn full(survey: &Survey, census: &Census, leaves: u32, size: usize) -> Option<Places> {
+        let (room, leaves) = (census.hittable() as usize, leaves as usize);
+        Places { refs: front(survey)?, nodes: 0, room, leaves }.fitting(room, leaves, size)
+    }
+
     /// The same with other numbers of refs and leaves, if they fit.
     pub fn fitting(&self, room: usize, leaves: usize, size: usize) -> Option<Places> {
         let nodes = (size / ALIGNMENT * ALIGNMENT).checked_sub(leaves.checked_mul(PAIR)?)?;

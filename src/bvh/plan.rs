@@ -28,6 +28,17 @@ pub(super) fn leaf_max(census: &Census, strip: usize) -> usize {
     }
 }
 
+/// What a tree may take of the memory.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Thrift {
+    /// All that leaves growing free.
+    Ample,
+    /// No refs are cut in two.
+    Uncut,
+    /// And as few leaves as may be.
+    Full,
+}
+
 /// What a tree is grown over, and where.
 pub(super) struct Plan {
     pub places: Places,
@@ -47,11 +58,14 @@ impl Plan {
     /// Gathers refs at the front of `bytes`, and puts them into runs where that is wanted and goes.
     pub fn new(
         census: &Census,
-        places: Places,
+        (places, thrift): (Places, Thrift),
         how: &How,
         source: Source,
         bytes: &mut [u8],
     ) -> Option<Plan> {
+        if thrift == Thrift::Full {
+            return Plan::full(census, places, how, source, bytes);
+        }
         let (size, areas) = (places.refs + bytes.len(), Areas::new(&census.bounds));
         let refs = storage::view_mut::<PrimRef>(bytes, 0, places.room)?;
         let Gathered { count, strip, leaves } =
@@ -66,7 +80,7 @@ impl Plan {
         };
         let uneven = uneven.filter(|_| apart == 0);
         let (prims, still) = (census.hittable(), census.sphere_count == 0 && !census.refit);
-        let cut = uneven.is_some_and(|effort| effort.cuts) && still;
+        let cut = uneven.is_some_and(|effort| effort.cuts) && still && thrift == Thrift::Ample;
         if uneven.is_none() && how.effort.blocks && census.triangle_count == prims {
             let refs = (count, apart, prims as usize);
             if let Some(places) = put_into_runs(refs, &places, (source, areas), how.caller, bytes) {
@@ -88,6 +102,24 @@ impl Plan {
         };
         let leaf_max = leaf_max(census, strip);
         Some(Plan { places, count, apart, leaf_max, uneven, cut, in_runs: false })
+    }
+}
+
+impl Plan {
+    /// For as few leaves as may be, since there is no room for those of a better tree. Of two kinds each comes to a side of its
+    /// own first of all: refs are in the order of their ids.
+    fn full(
+        census: &Census,
+        places: Places,
+        how: &How,
+        source: Source,
+        bytes: &mut [u8],
+    ) -> Option<Plan> {
+        let refs = storage::view_mut::<PrimRef>(bytes, 0, places.room)?;
+        let count = gather(source.scene, census, 1, how.caller, refs);
+        let apart = if census.is_mixed() { census.triangle_count as usize } else { 0 };
+        let leaf_max = leaf_max(census, 1);
+        Some(Plan { places, count, apart, leaf_max, uneven: None, cut: false, in_runs: false })
     }
 }
 

@@ -32,6 +32,9 @@ const _: () = assert!(size_of::<PrimRef>() == 32);
 // SAFETY: eight numbers of equal size, so no padding.
 unsafe impl Plain for PrimRef {}
 
+/// How much larger the box of a strip may be than those of its triangles together. Measured: see `docs/METHODS.md`.
+const WASTE: f32 = 1.2;
+
 impl PrimRef {
     /// Set in that word.
     const NORMAL: u32 = 1 << 30;
@@ -89,12 +92,12 @@ impl PrimRef {
         (self.bounds.lower[3], self.bounds.upper[3]) = (id, count);
     }
 
-    /// Takes in the triangle of the next id, if the area of both together is no more than the sum of each.
+    /// Takes in the triangle of the next id, if the area of both together is at most [`WASTE`] times the sum of each.
     fn extend(&mut self, next: &PrimRef, areas: Areas) -> bool {
         let mut both = self.bounds;
         both.add(&next.bounds);
         let area = |bounds: &Box4| areas.of_finite(bounds);
-        let pays = area(&both) <= 1.2 * (area(&self.bounds) + area(&next.bounds));
+        let pays = area(&both) <= WASTE * (area(&self.bounds) + area(&next.bounds));
         if pays {
             both.lower[3] = self.bounds.lower[3];
             both.upper[3] = self.bounds.upper[3] + 1.0;

@@ -44,7 +44,8 @@ pub(super) fn put_into_runs(
     let places = places.fitting(run_count, run_count, size)?;
     let order = (places.nodes - places.refs).checked_sub(2 * size_of::<u32>() * prims)?;
     let order = order.checked_sub((REF + KEYS) * count)?;
-    if run_count * FINISHED + size_of::<u32>() * prims > size - places.refs {
+    let finished = run_count.checked_mul(FINISHED)?.checked_add(size_of::<u32>() * prims)?;
+    if finished > size - places.refs {
         return None;
     }
     let to = storage::view_mut(refs, 0, run_count)?;

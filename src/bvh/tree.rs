@@ -81,6 +81,8 @@ impl Limits<'_, '_> {
 pub(crate) enum Depth {
     /// Not at all.
     Whole,
+    /// Not at all, and where leaves are scarce all but one are full.
+    Full,
     /// Until they are [alike](are_alike).
     Alike,
     /// As long as it pays.
@@ -247,7 +249,8 @@ impl Splitter<'_, '_, '_> {
         let spheres = if mixed { refs.iter().filter(|r| r.is_sphere()).count() } else { 0 };
         let one_kind = !mixed || spheres == 0 || spheres == count;
         let may_be_leaf = count <= leaf_max && one_kind;
-        if may_be_leaf && (count == 1 || task.budget < 2 || depth == Depth::Whole) {
+        let is_whole = matches!(depth, Depth::Whole | Depth::Full);
+        if may_be_leaf && (count == 1 || task.budget < 2 || is_whole) {
             return None;
         }
         let whole = || areas.of(&extent.bounds.aabb());
@@ -284,6 +287,8 @@ impl Splitter<'_, '_, '_> {
                 sort_few(refs, |r| (i32::from(r.is_sphere()) << 30) | r.id() as i32);
                 Some(Place { left_count: count - spheres, by_kind: true })
             }
+            // All leaves but one are full then.
+            None if depth == Depth::Full => Some(at(count.div_ceil(leaf_max) / 2 * leaf_max)),
             None => Some(at(count / 2)),
         }
     }
@@ -320,6 +325,10 @@ impl Splitter<'_, '_, '_> {
             return None;
         }
         let counts = cut.part(slots, task.count, shapes)?;
+        debug_assert!(
+            !counts.contains(&0),
+            "a wall lies between two slabs in which refs begin or end"
+        );
         let refs = slots.get(..counts[0] + counts[1])?;
         self.split_at(refs, counts[0], task.even, split);
         Some(())
@@ -327,7 +336,10 @@ impl Splitter<'_, '_, '_> {
 
     /// The fewest leaves that two sides need.
     fn fewest(self, counts: [usize; 2]) -> [usize; 2] {
-        let Limits { leaf_max, .. } = *self.limits;
+        let Limits { leaf_max, depth, .. } = *self.limits;
+        if WIDE && depth == Depth::Full {
+            return counts.map(|count| count.div_ceil(leaf_max));
+        }
         let mixed = SPHERES && self.limits.mixed;
         let [left, right] = counts;
         [fewest_leaves(left, mixed, leaf_max), fewest_leaves(right, mixed, leaf_max)]

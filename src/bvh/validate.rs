@@ -12,14 +12,14 @@ use crate::prim::Leaves;
 /// Nodes are stored as a depth-first walk meets them, each pair of children when their parent is
 /// met. So the walk is repeated with a counter: the pair of the next inner node is the next pair.
 /// That proves that each pair has exactly one parent, which comes before it, and takes no memory
-/// beyond a stack like a traversal's.
+/// beyond a stack like a traversal's. Each node waits with its depth: a traversal may leave either child for later.
 pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
     if nodes.len() < 2 {
         return false;
     }
     let mut right = Pending::NONE;
     let mut next_pair = 2;
-    let mut at = 0;
+    let (mut at, mut depth) = (0, 0);
     loop {
         let Some(node) = nodes.get(at as usize) else { return false };
         if node.is_leaf() {
@@ -30,12 +30,13 @@ pub(crate) fn tree_is_sound(nodes: &[BvhNode], leaves: &Leaves) -> bool {
                 // The walk is over: all nodes must have been met.
                 return next_pair as usize == nodes.len();
             };
-            at = next;
+            (at, depth) = next;
         } else {
             if node.first != next_pair || next_pair as usize + 1 >= nodes.len() {
                 return false;
             }
-            if !right.push(node.first + 1) {
+            depth += 1;
+            if depth > MAX_DEPTH || !right.push((node.first + 1, depth)) {
                 return false;
             }
             at = node.first;
@@ -261,15 +262,19 @@ mod tests {
 
     #[test]
     fn what_is_deeper_than_the_stack_is_refused() {
-        let chain = |depth: u32| {
+        let chain = |depth: u32, turn: fn(u32) -> bool| {
             let mut nodes = std::vec![inner(2), inner(0)];
             for level in 1..depth {
-                nodes.extend([inner(2 * level + 2), LEAF]);
+                let (next, is_left) = (inner(2 * level + 2), turn(level));
+                nodes.extend(if is_left { [next, LEAF] } else { [LEAF, next] });
             }
             nodes.extend([LEAF, LEAF]);
             nodes
         };
-        assert!(is_sound(&chain(MAX_DEPTH as u32)));
-        assert!(!is_sound(&chain(MAX_DEPTH as u32 + 1)));
+        // To the left, to the right, and both: a ray may leave either child for later.
+        for turn in [|_| true, |_| false, |level| level % 2 == 0] {
+            assert!(is_sound(&chain(MAX_DEPTH as u32, turn)));
+            assert!(!is_sound(&chain(MAX_DEPTH as u32 + 1, turn)));
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::emit::{Outline, Sizes};
 use super::fill::{pack, take_marks_off};
 use super::lanes::Chosen;
 use super::places::{PAIR, Places};
-use super::plan::{Plan, leaf_max};
+use super::plan::{Plan, Thrift, leaf_max};
 use super::refs::PrimRef;
 use super::reinsert::mend;
 use super::runs::name_ids;
@@ -38,21 +38,38 @@ pub(crate) fn needs_wide(
     width: u32,
 ) -> Result<(usize, usize), BuildError> {
     let (compact, minimum) = compact::needs(survey, census)?;
-    let triangle_blocks = (u64::from(census.triangle_count) * 20).div_ceil(71) as u32;
-    let leaves = census.sphere_count.div_ceil(if census.is_index { 1 } else { 4 });
-    // Three lanes for two leaf blocks.
-    let lanes = 3 * u64::from(triangle_blocks + leaves) / 2;
-    let bundles = 2 + lanes / u64::from(width);
-    let sizes = Sizes { bundles: bundles as u32, triangle_blocks, sphere_blocks: leaves };
-    let finished = counts(survey, census, census.hittable(), &sizes, width)
-        .offsets()
-        .ok_or(BuildError::TooLarge)?;
+    let [triangle_blocks, leaves] = planned_leaves(census);
+    let finished =
+        finished(survey, census, [triangle_blocks, leaves], width).ok_or(BuildError::TooLarge)?;
     let prims = u64::from(if census.is_index { census.hittable() } else { 0 });
     // And what is lost between them.
     let beside = (prims * SCRATCH).next_multiple_of(ALIGNMENT as u64) + 4 * ALIGNMENT as u64;
     let beside = usize::try_from(beside).map_err(|_| BuildError::TooLarge)?;
-    let size = finished.end.checked_add(beside).ok_or(BuildError::TooLarge)?;
+    let size = finished.checked_add(beside).ok_or(BuildError::TooLarge)?;
     Ok((compact.max(size), minimum))
+}
+
+/// The bytes of a block with so many leaves over triangles, and over all else.
+fn finished(survey: &Survey, census: &Census, leaves: [u32; 2], width: u32) -> Option<usize> {
+    let [triangle_blocks, sphere_blocks] = leaves;
+    // Three lanes for two leaf blocks.
+    let lanes = 3 * u64::from(triangle_blocks + sphere_blocks) / 2;
+    let bundles = (2 + lanes / u64::from(width)) as u32;
+    let sizes = Sizes { bundles, triangle_blocks, sphere_blocks };
+    Some(counts(survey, census, census.hittable(), &sizes, width).offsets()?.end)
+}
+
+/// The leaves over triangles, and those over spheres or instances, for which there shall be room.
+fn planned_leaves(census: &Census) -> [u32; 2] {
+    let triangle_blocks = (u64::from(census.triangle_count) * 20).div_ceil(71) as u32;
+    let others = census.sphere_count.div_ceil(if census.is_index { 1 } else { 4 });
+    [triangle_blocks, others]
+}
+
+/// The fewest leaves, each of one kind.
+fn least_leaves(census: &Census, leaf_max: usize) -> u32 {
+    let least = |count: u32| count.div_ceil(leaf_max as u32);
+    least(census.triangle_count) + least(census.sphere_count)
 }
 
 /// The parts of the finished block. In an index every leaf is one instance, so its number among the ids says all, and it has no
@@ -107,29 +124,41 @@ fn build<const W: usize>(
 where
     Bundle<W>: Plain,
 {
-    let places = Places::new(survey, census, leaf_max(census, 1), bytes.len())?;
+    let room = bytes.len();
+    let places = || Places::new(survey, census, leaf_max(census, 1), room);
+    let (first, again) = (places()?, places()?);
     how.caller.done(0.1)?;
-    let scratch = grow_tree(scene, survey, census, places, how, bytes)?;
-    how.caller.done(0.6)?;
-    let prims = scratch.prims as u32;
-    let first_sphere = scratch.prims - census.sphere_count as usize;
-    let areas = Areas::new(&census.bounds);
-    let whole = areas.of(&census.bounds);
-    let mean = whole / prims as f32;
-    for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
-        let worth = Worth { areas, price, census };
-        let outline = scratch.choose::<W>(scene, survey, worth, how.caller, bytes)?;
-        let counts = counts(survey, census, prims, &outline.sizes, W as u32);
-        let at = counts.offsets()?;
-        if at.words <= scratch.choices && at.end <= bytes.len() {
-            how.caller.done(0.85)?;
-            scratch.emit::<W>(&outline, first_sphere, &counts, how.caller, bytes)?;
-            let parts = counts.parts_mut(bytes)?;
-            match census.is_index {
-                true => take_marks_off(parts.prim_ids),
-                false => pack((scene, census.refit), first_sphere, parts, how.caller)?,
-            }
-            return counts.seal(KIND_BVH, W as u32, census, bytes);
+    let mut built = |places: Places, thrift: Thrift| {
+        let scratch = grow_tree(scene, survey, census, (places, thrift), how, bytes)?;
+        how.caller.done(0.6)?;
+        let size = scratch.finish::<W>(scene, survey, census, how, bytes);
+        if size.is_none() {
+            bytes.fill(0);
+        }
+        Some((size, scratch.cut))
+    };
+    let (size, cut) = built(first, Thrift::Ample)?;
+    if size.is_some() || how.caller.cancelled() || census.is_index {
+        return size;
+    }
+    // What was cut in two has too many leaves.
+    if cut && let (Some(size), _) = built(again, Thrift::Uncut)? {
+        return Some(size);
+    }
+    // Or any tree has, however leaves are put together.
+    let least = least_leaves(census, leaf_max(census, 1));
+    let mut leaves = planned_leaves(census).into_iter().sum::<u32>();
+    while finished(survey, census, [leaves, 0], W as u32)? > room {
+        leaves = leaves.checked_sub(1 + leaves / 64).filter(|leaves| *leaves >= least)?;
+    }
+    // Bundles may be more than was planned for.
+    for leaves in [leaves, least.midpoint(leaves)] {
+        if how.caller.cancelled() {
+            return None;
+        }
+        let places = Places::full(survey, census, leaves, room)?;
+        if let (Some(size), _) = built(places, Thrift::Full)? {
+            return Some(size);
         }
     }
     None
@@ -140,7 +169,7 @@ fn grow_tree(
     scene: &Scene,
     survey: &Survey,
     census: &Census,
-    places: Places,
+    (places, thrift): (Places, Thrift),
     how: &How,
     bytes: &mut [u8],
 ) -> Option<Scratch> {
@@ -151,20 +180,22 @@ fn grow_tree(
     let geometries: &[Geometry] = table.parts_mut(front)?.geometries;
     let source = Source { scene, geometries, named: false };
     let Plan { places, count, apart, leaf_max, uneven, cut, in_runs } =
-        Plan::new(census, places, how, source, rest)?;
+        Plan::new(census, (places, thrift), how, source, rest)?;
+    let full = thrift == Thrift::Full;
     let (refs, tail) = rest.split_at_mut_checked(places.nodes - places.refs)?;
     let nodes = storage::view_mut::<BvhNode>(tail, 0, 2 * places.leaves)?;
     let slots = storage::view_mut::<PrimRef>(refs, 0, places.room)?;
     let effort = uneven.unwrap_or(how.effort);
-    let in_blocks = effort.blocks && !in_runs;
+    let in_blocks = effort.blocks && !in_runs && !full;
     let limits = Limits {
         leaves: places.leaves,
         source: cut.then_some(source),
         blocks: in_blocks.then_some(source),
         leaf_max,
         apart,
-        mixed: census.is_mixed(),
+        mixed: census.is_mixed() && !full,
         depth: match uneven {
+            _ if full => Depth::Full,
             Some(_) => Depth::Alike,
             None if effort.whole => Depth::Whole,
             None => Depth::Deep,
@@ -185,7 +216,7 @@ fn grow_tree(
         true => TRIANGLES_AT_LEAST,
         false => usize::MAX,
     };
-    Scratch::new(&places, &size, together)
+    Scratch::new(&places, &size, cut, together)
 }
 
 /// Moves the ids of all refs to the end of their place; returns what is free before them, and them.
@@ -221,17 +252,55 @@ struct Scratch {
     prims: usize,
     nodes: usize,
     node_count: usize,
+    /// Whether refs may have been cut in two.
+    cut: bool,
     /// As in [`Grounds`].
     together: usize,
 }
 
 impl Scratch {
-    fn new(places: &Places, size: &Size, together: usize) -> Option<Scratch> {
+    fn new(places: &Places, size: &Size, cut: bool, together: usize) -> Option<Scratch> {
         let pairs = size.nodes / 2 - 1;
         let ids = places.nodes - 4 * size.prims;
         let choices = (ids / 8 * 8).checked_sub(8 * pairs)?;
         let (prims, nodes, node_count) = (size.prims, places.nodes, size.nodes);
-        Some(Scratch { choices, pairs, ids, prims, nodes, node_count, together })
+        Some(Scratch { choices, pairs, ids, prims, nodes, node_count, cut, together })
+    }
+
+    /// Chooses what becomes of nodes, so that the block fits, and writes it; returns its size.
+    fn finish<const W: usize>(
+        &self,
+        scene: &Scene,
+        survey: &Survey,
+        census: &Census,
+        how: &How,
+        bytes: &mut [u8],
+    ) -> Option<usize>
+    where
+        Bundle<W>: Plain,
+    {
+        let prims = self.prims as u32;
+        let first_sphere = self.prims - census.sphere_count as usize;
+        let areas = Areas::new(&census.bounds);
+        let whole = areas.of(&census.bounds);
+        let mean = whole / prims as f32;
+        for price in [whole / (1u64 << 36) as f32, 8.0 * mean, 64.0 * mean, whole] {
+            let worth = Worth { areas, price, census };
+            let outline = self.choose::<W>(scene, survey, worth, how.caller, bytes)?;
+            let counts = counts(survey, census, prims, &outline.sizes, W as u32);
+            let at = counts.offsets()?;
+            if at.words <= self.choices && at.end <= bytes.len() {
+                how.caller.done(0.85)?;
+                self.emit::<W>(&outline, first_sphere, &counts, how.caller, bytes)?;
+                let parts = counts.parts_mut(bytes)?;
+                match census.is_index {
+                    true => take_marks_off(parts.prim_ids),
+                    false => pack((scene, census.refit), first_sphere, parts, how.caller)?,
+                }
+                return counts.seal(KIND_BVH, W as u32, census, bytes);
+            }
+        }
+        None
     }
 
     fn choose<const W: usize>(

@@ -11,7 +11,8 @@ use crate::accel::Accel;
 use crate::query::QueryOptions;
 use crate::ray::{Hit, Ray};
 
-/// `rt_intersect` for `count` rays. When a pointer is null, nothing is written.
+/// `rt_intersect` for `count` rays, on the calling thread: parts of an array may be asked for at the same time. When a pointer is null or
+/// the arrays overlap, nothing is written; `rt_intersect_batch_with` says so.
 ///
 /// # Safety
 ///
@@ -27,7 +28,7 @@ pub unsafe extern "C" fn rt_intersect_batch(
     let _ = unsafe { rt_intersect_batch_with(accel, rays, 0, core::ptr::null(), hits, 0, count) };
 }
 
-/// `rt_occluded` for `count` rays: 1 for a hit, 0 for none. When a pointer is null, nothing is
+/// `rt_occluded` for `count` rays: 1 for a hit, 0 for none. When a pointer is null or the arrays overlap, nothing is
 /// written.
 ///
 /// # Safety
@@ -50,6 +51,9 @@ pub unsafe extern "C" fn rt_occluded_batch(
 /// apart. A stride of 0 means packed; others are multiples of 4 and no less than the struct.
 /// `query` may be null. When refused, nothing is written.
 ///
+/// The arrays do not overlap, or at equal strides each hit lies in the place of its own ray or between two rays; anything else is
+/// refused. So hits may take the place of rays, or stand beside them in one struct.
+///
 /// # Safety
 ///
 /// Every pointer is null or valid for `count` elements, and nobody else uses `hits` during the call.
@@ -70,7 +74,7 @@ pub unsafe extern "C" fn rt_intersect_batch_with(
 }
 
 /// `rt_occluded_with` for `count` rays, `ray_stride` bytes apart, into bytes `occluded_stride` bytes
-/// apart. A stride of 0 means packed. `query` may be null. When refused, nothing is written.
+/// apart. A stride of 0 means packed. `query` may be null. When refused, nothing is written. Arrays may overlap as above.
 ///
 /// # Safety
 ///
@@ -120,6 +124,9 @@ unsafe fn batch<'m, A: SameAs<T>, T>(
     let options = unsafe { query_options(query) }?;
     let rays = Column::new(rays.0, rays.1, count)?;
     let out = Column::new(out.0.cast_const(), out.1, count)?;
+    if count > 0 && !rays.may_be_answered_in(&out, count) {
+        return Err(Error::InvalidArgument);
+    }
     if rays.is_packed() && out.is_packed() {
         for first in (0..count).step_by(SIDE_BY_SIDE) {
             let size = SIDE_BY_SIDE.min(count - first);
@@ -194,6 +201,25 @@ impl<T> Column<T> {
             first.addr().checked_add(bytes.ok_or(Error::TooLarge)?).ok_or(Error::TooLarge)?;
         }
         Ok(Column { first, stride })
+    }
+
+    /// Whether no answer written to `out` takes the place of a ray that is still to be read: the arrays do not overlap, or at equal
+    /// strides each answer lies within the reach of its own ray, or between rays.
+    fn may_be_answered_in<A>(&self, out: &Column<A>, count: usize) -> bool {
+        let (ray, answer, stride) = (self.first.addr(), out.first.addr(), self.stride);
+        let end = |first, stride, size| first + (count - 1) * stride + size;
+        if end(ray, stride, size_of::<T>()) <= answer
+            || end(answer, out.stride, size_of::<A>()) <= ray
+        {
+            return true;
+        }
+        if out.stride != stride {
+            return false;
+        }
+        let is_own = answer.checked_sub(ray).is_some_and(|at| at + size_of::<A>() <= stride);
+        let behind =
+            answer.wrapping_sub(ray).cast_signed().rem_euclid(stride.cast_signed()) as usize;
+        is_own || (size_of::<T>() <= behind && behind + size_of::<A>() <= stride)
     }
 
     fn is_packed(&self) -> bool {

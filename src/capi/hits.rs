@@ -2,10 +2,10 @@
 
 use super::batch::filled;
 use super::query::{query_options, ray_at};
-use super::status::Error;
+use super::status::{Error, RtStatus};
 use super::types::{RtAccel, RtCursor, RtHit, RtQuery, RtRay};
 use super::versioned::{self, Output, pointer};
-use super::{accel_at, answer};
+use super::{accel_at, answer, guard};
 use crate::accel::Accel;
 use crate::hits::HitKey;
 use crate::query::{PrimId, QueryOptions};
@@ -25,8 +25,8 @@ use crate::ray::{Hit, Ray};
 /// whatever `query->precision` is, and the first of all is that of `rt_intersect`. What is in `hits`
 /// behind those returned may be written too.
 ///
-/// 0 when another pointer is null, when query or cursor are refused, as `rt_query_check` would, and
-/// when the cursor names a hit that the ray does not have.
+/// 0, and nothing written, when another pointer is null, when query or cursor are refused, and when the cursor names a hit that the
+/// ray does not have: `rt_all_hits_checked` says which.
 ///
 /// # Safety
 ///
@@ -41,34 +41,71 @@ pub unsafe extern "C" fn rt_all_hits(
     hits: *mut RtHit,
     capacity: usize,
 ) -> usize {
-    let ask = || -> Result<usize, Error> {
-        // SAFETY: the caller's promise.
-        let accel = unsafe { accel_at(accel) }?;
-        // SAFETY: the caller's promise.
-        let ray = unsafe { ray_at(ray) }?;
-        // SAFETY: the caller's promise.
-        let options = unsafe { query_options(query) }?;
-        if capacity
-            .checked_mul(size_of::<RtHit>())
-            .is_none_or(|size| isize::try_from(size).is_err())
-        {
-            return Err(Error::TooLarge);
-        }
-        let list = List { accel: &accel, ray, options: &options, room: (hits, capacity) };
-        if cursor.is_null() {
-            // SAFETY: the caller's promise.
-            return unsafe { list.fill(&mut None) };
-        }
-        // SAFETY: the caller's promise.
-        let mut last = unsafe { versioned::read(cursor) }?.checked()?;
-        // SAFETY: the caller's promise.
-        let out = unsafe { Output::new(cursor) }?;
-        // SAFETY: the caller's promise.
-        let count = unsafe { list.fill(&mut last) }?;
-        out.write(|struct_size| RtCursor::new(struct_size, last));
-        Ok(count)
-    };
+    // SAFETY: the caller's promise.
+    let ask = || unsafe { all_hits((accel, ray, query), cursor, (hits, capacity)) };
     answer(|| ask().unwrap_or(0), 0)
+}
+
+/// `rt_all_hits` that says why it was refused, and else writes to `*count` how many hits it wrote. RT_ERROR_NOT_FOUND: the ray does
+/// not have the hit that the cursor names. When refused, nothing is written.
+///
+/// # Safety
+///
+/// As for `rt_all_hits`; nobody else uses `*count` during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rt_all_hits_checked(
+    accel: *const RtAccel,
+    ray: *const RtRay,
+    query: *const RtQuery,
+    cursor: *mut RtCursor,
+    hits: *mut RtHit,
+    capacity: usize,
+    count: *mut usize,
+) -> RtStatus {
+    guard(|| {
+        let count = pointer(count)?;
+        // SAFETY: the caller's promise.
+        let found = unsafe { all_hits((accel, ray, query), cursor, (hits, capacity)) }?;
+        // SAFETY: not null, aligned, and valid as the caller promises.
+        unsafe { count.write(found) };
+        Ok(())
+    })
+}
+
+/// Writes hits and moves the cursor; returns how many there are.
+///
+/// # Safety
+///
+/// As for `rt_all_hits`.
+unsafe fn all_hits(
+    (accel, ray, query): (*const RtAccel, *const RtRay, *const RtQuery),
+    cursor: *mut RtCursor,
+    (hits, capacity): (*mut RtHit, usize),
+) -> Result<usize, Error> {
+    // SAFETY: the caller's promise.
+    let accel = unsafe { accel_at(accel) }?;
+    // SAFETY: the caller's promise.
+    let ray = unsafe { ray_at(ray) }?;
+    // SAFETY: the caller's promise.
+    let options = unsafe { query_options(query) }?;
+    let bytes = capacity.checked_mul(size_of::<RtHit>());
+    bytes.filter(|bytes| isize::try_from(*bytes).is_ok()).ok_or(Error::TooLarge)?;
+    let room = (pointer(hits)?.as_ptr(), capacity);
+    let list = List { accel: &accel, ray, options: &options, room };
+    if cursor.is_null() {
+        // SAFETY: the caller's promise.
+        return unsafe { list.fill(&mut None) };
+    }
+    // SAFETY: the caller's promise.
+    let mut last = unsafe { versioned::read(cursor) }?.checked()?;
+    // SAFETY: the caller's promise.
+    let out = unsafe { Output::new(cursor) }?;
+    // Before anything is written.
+    accel.hits_after(ray, &options, &mut last, &mut []).ok_or(Error::NotFound)?;
+    // SAFETY: the caller's promise.
+    let count = unsafe { list.fill(&mut last) }?;
+    out.write(|struct_size| RtCursor::new(struct_size, last));
+    Ok(count)
 }
 
 /// So many hits are looked for in one search: of a large array most is never written.
@@ -86,16 +123,17 @@ impl List<'_> {
     ///
     /// # Safety
     ///
-    /// The room is null or valid, and nobody else uses it during the call.
+    /// The room is valid, and nobody else uses it during the call.
     unsafe fn fill(&self, last: &mut Option<HitKey>) -> Result<usize, Error> {
         let (hits, capacity) = self.room;
-        let hits = pointer(hits)?.as_ptr().cast::<Hit>();
+        let hits = hits.cast::<Hit>();
         let mut written = 0;
         while written < capacity {
             let size = PART.min(capacity - written);
             // SAFETY: within the room, which the caller promises; a hit of C is one of ours.
             let part = unsafe { filled(hits.wrapping_add(written), size, Hit::MISS) };
-            let count = self.accel.more_hits(self.ray, self.options, last, part);
+            let count = self.accel.hits_after(self.ray, self.options, last, part);
+            let count = count.ok_or(Error::NotFound)?;
             written += count;
             if count < size {
                 break;

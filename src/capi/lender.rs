@@ -1,6 +1,7 @@
 //! Build options from C: choices, and what the caller lends to a build.
 
 use core::ffi::c_void;
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::control;
 use super::status::Error;
@@ -10,7 +11,7 @@ use super::types::{
     RT_PLAIN_LIST_AUTOMATIC, RT_PLAIN_LIST_NEVER, RT_QUALITY_BALANCED, RT_QUALITY_BEST,
     RT_QUALITY_FAST, RtBuildOptions,
 };
-use super::versioned;
+use super::{stopping_panics, versioned};
 use crate::accel::Layout;
 use crate::build::{BuildOptions, PlainList, Quality};
 use crate::caller::Threads;
@@ -48,6 +49,12 @@ impl Lender {
         }
     }
 
+    /// The threads that are lent.
+    pub fn threads(&self) -> Option<&dyn Threads> {
+        let lends = self.0.as_ref().is_some_and(|raw| THREADS && raw.parallel_for.is_some());
+        if lends { Some(self) } else { None }
+    }
+
     /// The options as a build takes them.
     pub fn options<'l>(
         &'l self,
@@ -77,14 +84,12 @@ impl Lender {
             RT_PLAIN_LIST_ALWAYS => PlainList::Always,
             _ => return Err(Error::InvalidArgument),
         };
-        let threads: Option<&dyn Threads> =
-            if THREADS && raw.parallel_for.is_some() { Some(self) } else { None };
+        let (threads, progress) = (self.threads(), Some(progress));
         let (grid, rays_per_prim) = (grid_options(raw)?, raw.rays_per_prim);
         // Written so that a NaN is refused.
         if !(rays_per_prim >= 0.0) {
             return Err(Error::InvalidArgument);
         }
-        let progress = Some(progress);
         Ok(BuildOptions {
             quality,
             layout,
@@ -106,15 +111,16 @@ fn grid_options(raw: &RtBuildOptions) -> Result<GridOptions, Error> {
         RT_GRID_OCTREE => GridKind::Octree,
         _ => return Err(Error::InvalidArgument),
     };
-    // Written so that a NaN is refused.
-    if !(raw.grid_density >= 0.0) {
-        return Err(Error::InvalidArgument);
-    }
-    Ok(GridOptions { kind, density: raw.grid_density, depth: raw.grid_depth })
+    let options = GridOptions { kind, density: raw.grid_density, depth: raw.grid_depth };
+    if options.are_in_range() { Ok(options) } else { Err(Error::InvalidArgument) }
 }
 
-/// What a task is, as `context` points to it.
-type Task<'t> = &'t (dyn Fn(u32) + Sync);
+/// A task, as `context` points to it.
+struct Task<'t> {
+    task: &'t (dyn Fn(u32) + Sync),
+    /// Whether one panicked, which must not reach the caller's thread.
+    failed: AtomicBool,
+}
 
 /// Runs a task on a thread of the caller's, whose floating-point state may be any.
 ///
@@ -123,8 +129,10 @@ type Task<'t> = &'t (dyn Fn(u32) + Sync);
 /// `context` is what `parallel_for` was given, and that call has not returned.
 unsafe extern "C" fn run(context: *mut c_void, index: u32) {
     // SAFETY: it points to the task of a call that waits.
-    let task = unsafe { *context.cast_const().cast::<Task>() };
-    control::with_default(|| task(index));
+    let Task { task, failed } = unsafe { &*context.cast_const().cast::<Task>() };
+    if control::with_default(|| stopping_panics(|| task(index))).is_none() {
+        failed.store(true, Ordering::Relaxed);
+    }
 }
 
 impl Threads for Lender {
@@ -136,10 +144,51 @@ impl Threads for Lender {
         if let Some(raw) = &self.0
             && let Some(parallel_for) = raw.parallel_for
         {
-            let context: Task = task;
-            let context = core::ptr::from_ref(&context).cast_mut().cast();
+            let task = Task { task, failed: AtomicBool::new(false) };
+            let context = core::ptr::from_ref(&task).cast_mut().cast();
             // SAFETY: the caller's function with what belongs to it, as promised to `read`.
             unsafe { parallel_for(raw.user, count, Some(run), context) };
+            // On this thread it can be told. Without std it does not come back.
+            #[cfg(feature = "std")]
+            assert!(!task.failed.into_inner(), "a task panicked");
         }
+    }
+}
+
+#[cfg(all(test, feature = "std"))]
+mod tests {
+    use super::super::types::RtTask;
+    use super::*;
+
+    unsafe extern "C" fn backwards(_: *mut c_void, count: u32, task: RtTask, context: *mut c_void) {
+        for i in (0..count).rev() {
+            // SAFETY: as it was given.
+            unsafe { task.expect("a task")(context, i) };
+        }
+    }
+
+    #[test]
+    fn a_task_that_panics_is_told_to_the_build_and_not_to_the_thread() {
+        // SAFETY: zeros are a value of it.
+        let zero = unsafe { core::mem::zeroed::<RtBuildOptions>() };
+        let raw = RtBuildOptions {
+            struct_size: size_of::<RtBuildOptions>() as u32,
+            worker_count: 2,
+            parallel_for: Some(backwards),
+            ..zero
+        };
+        // SAFETY: valid, and its function does as it should.
+        let lender = unsafe { Lender::read(&raw) }.expect("options");
+        let ran = AtomicBool::new(false);
+        let all = |bad: u32| {
+            lender.parallel_for(5, &|i| {
+                assert!(i != bad, "on purpose");
+                if i == 0 {
+                    ran.store(true, Ordering::Relaxed);
+                }
+            });
+        };
+        assert!(stopping_panics(|| all(9)).is_some() && ran.swap(false, Ordering::Relaxed));
+        assert!(stopping_panics(|| all(3)).is_none() && ran.into_inner(), "the others ran");
     }
 }

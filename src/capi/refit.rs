@@ -52,14 +52,12 @@ pub unsafe extern "C" fn rt_accel_refit_with(
         let scene = unsafe { CheckedScene::new(moved) }?;
         // SAFETY: the caller's promise.
         let lender = unsafe { Lender::read(options) }?;
-        let progress = lender.progress();
-        let options = lender.options(&progress)?;
         let memory = pointer(memory.cast::<u8>())?;
         // A slice cannot be longer, and no block is.
         let size = size.min(isize::MAX as usize);
         // SAFETY: valid for `size` bytes and used by nobody else, as the caller promises.
         let bytes = unsafe { core::slice::from_raw_parts_mut(memory.as_ptr(), size) };
-        refit(bytes, &Scene::foreign(&scene, &scene), &Caller::new(options.threads, None))?;
+        refit(bytes, &Scene::foreign(&scene, &scene), &Caller::new(lender.threads(), None))?;
         Ok(())
     })
 }

@@ -1,6 +1,6 @@
 //! What the calls return: numbers for C, an enum inside.
 
-use core::ffi::{CStr, c_char};
+use core::ffi::CStr;
 
 use crate::error::{BuildError, OpenError, RefitError};
 
@@ -163,7 +163,7 @@ const MESSAGES: &str = concat!(
     "a triangle names a vertex that its mesh does not have\0",
     "the memory is smaller than the minimum\0",
     "a pointer is not aligned\0",
-    "the scene is too large to be numbered or stored\0",
+    "an array, the scene or the memory it needs is too large\0",
     "the bytes are not a raykern block\0",
     "the block was written on a machine of the other byte order\0",
     "the block is of another version of the format\0",
@@ -183,15 +183,10 @@ const MESSAGES: &str = concat!(
 /// The number of no status, which was one once.
 const UNKNOWN: usize = 4;
 
-fn message(status: RtStatus) -> &'static CStr {
+/// The sentence for a number.
+pub(super) fn message(status: RtStatus) -> &'static CStr {
     let sentence = |number| MESSAGES.as_bytes().split_inclusive(|byte| *byte == 0).nth(number);
     let number = usize::try_from(status).unwrap_or(UNKNOWN);
     let bytes = sentence(number).or_else(|| sentence(UNKNOWN)).unwrap_or_default();
     CStr::from_bytes_until_nul(bytes).unwrap_or_default()
-}
-
-/// A sentence for `status`, also for numbers that are no status. It need not be freed.
-#[unsafe(no_mangle)]
-pub extern "C" fn rt_status_message(status: RtStatus) -> *const c_char {
-    message(status).as_ptr()
 }

@@ -1,8 +1,18 @@
-//! Which version this is.
+//! What the library says of itself: its version, and what statuses mean.
+
+use core::ffi::c_char;
+
+use super::status::{RtStatus, message};
 
 /// What the header says, in cbindgen.toml.
 const RT_RAYKERN_VERSION: u32 = 0x000100;
 const _: () = assert!(RT_RAYKERN_VERSION == version());
+
+/// A sentence for `status`, also for numbers that are no status. It need not be freed.
+#[unsafe(no_mangle)]
+pub extern "C" fn rt_status_message(status: RtStatus) -> *const c_char {
+    message(status).as_ptr()
+}
 
 /// The version of the library, in the form of RT_RAYKERN_VERSION.
 #[unsafe(no_mangle)]

@@ -20,18 +20,15 @@ pub(super) fn fill(
     options: &QueryOptions,
     last: &mut Option<HitKey>,
     hits: &mut [Hit],
-) -> usize {
+) -> Option<usize> {
     let places = Places { block, level, ray };
     let mut list = List { places, options, after: None, hits, count: 0 };
     if let Some(key) = last {
-        // What the ray does not meet is followed by nothing.
-        if places.met(key).is_none() {
-            return 0;
-        }
+        places.met(key)?;
         list.after = Some(*key);
     }
     if list.hits.is_empty() {
-        return 0;
+        return Some(0);
     }
     let start = last.map_or(*ray, |key| from(ray, &key));
     list.gather(&Shown::own(block), &start);
@@ -48,7 +45,7 @@ pub(super) fn fill(
     if let Some(hit) = hits.get(..count).and_then(<[_]>::last) {
         *last = Some(key_of(hit));
     }
-    count
+    Some(count)
 }
 
 /// Where the hits of a ray are looked up.
@@ -108,7 +105,7 @@ impl List<'_, '_, '_> {
         let mut last = self.after.filter(own).map(alone);
         loop {
             let mut found = [Hit::MISS; FETCH];
-            let count = fill_marked(shown, ray, self.options, &mut last, &mut found);
+            let count = fill_marked(shown, ray, self.options, &mut last, &mut found).unwrap_or(0);
             for hit in found.iter().take(count) {
                 if !self.offer(Hit { instance: shown.instance, ..*hit }) {
                     return;

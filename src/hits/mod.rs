@@ -55,7 +55,8 @@ impl Iterator for Hits<'_> {
     fn next(&mut self) -> Option<Hit> {
         if self.next == FETCH {
             let Hits { block, ray, options, .. } = self;
-            self.count = fill(*block, ray, options, &mut self.last, &mut self.found);
+            let found = fill(*block, ray, options, &mut self.last, &mut self.found);
+            self.count = found.unwrap_or(0);
             self.next = 0;
         }
         let hit = self.found[..self.count].get(self.next).copied()?;
@@ -72,20 +73,21 @@ impl core::fmt::Debug for Hits<'_> {
     }
 }
 
-/// The first hits after `last` into `hits`; returns how many, and `last` becomes the last of them.
+/// The first hits after `last` into `hits`; returns how many, and `last` becomes the last of them. `None` when the ray does not
+/// have that: nothing is written then.
 pub(crate) fn fill(
     block: Finished,
     ray: &Ray,
     options: &QueryOptions,
     last: &mut Option<HitKey>,
     hits: &mut [Hit],
-) -> usize {
+) -> Option<usize> {
     let count = match block.level() {
         None => fill_marked(&Shown::own(block), ray, options, last, hits),
         Some(level) => instances::fill(block, &level, ray, options, last, hits),
-    };
+    }?;
     hits.iter_mut().take(count).for_each(|hit| hit.u = hit.u.max(0.0));
-    count
+    Some(count)
 }
 
 /// The weight of a hit for which this one stands for now: where the ray leaves a sphere.
@@ -99,25 +101,22 @@ fn fill_marked(
     options: &QueryOptions,
     last: &mut Option<HitKey>,
     hits: &mut [Hit],
-) -> usize {
+) -> Option<usize> {
     let (block, mut ray) = (shown.block, *ray);
     let mut after = None;
     if let Some(key) = last {
-        after = locate(block, &ray, key);
-        if after.is_none() {
-            return 0;
-        }
+        after = Some(locate(block, &ray, key)?);
         ray = from(&ray, key);
     }
     if hits.is_empty() {
-        return 0;
+        return Some(0);
     }
     let choice = shown.choice(options);
     let count = trace::ask(block, &ray, HitsAfter { choice, after, hits });
     if let Some(hit) = hits.get(..count).and_then(<[_]>::last) {
         *last = Some(key_of(hit));
     }
-    count
+    Some(count)
 }
 
 /// The key of a hit that is marked if the ray leaves a sphere there.

@@ -21,9 +21,12 @@ impl Parts {
     }
 
     fn new(root: &Bundle<16>) -> Self {
-        let used = root.refs.iter().take_while(|child| **child != ChildRef::NONE).count();
-        // The first once more in lanes without a child.
-        let lane = |wall: &[f32; 16], i: usize| f64::from(wall[if i < used { i } else { 0 }]);
+        // In a block that moves there may be a child of which nothing can be hit now: its box is empty, and infinite.
+        let holds =
+            |i: &usize| root.refs[*i] != ChildRef::NONE && root.walls[0][*i] <= root.walls[3][*i];
+        let first = (0..16).find(holds).unwrap_or(0);
+        // The first once more in lanes without anything.
+        let lane = |wall: &[f32; 16], i: usize| f64::from(wall[if holds(&i) { i } else { first }]);
         Parts { walls: root.walls.map(|wall| core::array::from_fn(|i| lane(&wall, i))) }
     }
 

@@ -10,7 +10,7 @@ use crate::block::bundle::{Bundle, ChildRef};
 use crate::block::level::Level;
 use crate::block::{Block, Bundles};
 use crate::math::Bits;
-use crate::math::rounding::f32_below;
+use crate::math::rounding::{LOOSE, f32_below};
 use crate::ray::{Alike, NONE, Ray, RayPacket, Slab, WideBoxes};
 use crate::simd::{Kernel, Lanes, Simd, Width};
 
@@ -160,7 +160,7 @@ impl Gatherer<'_, '_> {
                     // Depths are what `t` times this is.
                     let rate = f64::from(ray.direction[depth].abs()) * f64::from(alike.scale);
                     let t = f64::from(near) / rate;
-                    stops.add(instance, f32_below(t - t.abs() * 1e-12));
+                    stops.add(instance, f32_below(t - t.abs() * LOOSE));
                 }
             }
         }

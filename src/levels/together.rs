@@ -134,7 +134,8 @@ fn of_each<A: Asked>(
         if flies && !(cached && are_unlike(rays)) {
             chunk.ask::<A>(rays, answers);
         } else {
-            answers.fill(A::NOTHING);
+            let count = rays.len().min(answers.len());
+            answers[..count].fill(A::NOTHING);
             chunk.ask_alone::<A>(rays, answers, |_| true);
         }
     }

@@ -17,6 +17,9 @@ pub(crate) const fn gamma(n: u32) -> f64 {
     nu / (1.0 - nu) * (1.0 + 2.0 * UNIT)
 }
 
+/// Far above the relative error of a few roundings in `f64`: for bounds that need not be tight.
+pub(crate) const LOOSE: f64 = 1e-12;
+
 /// The largest `f32` that is not above `x`; NaN stays NaN.
 #[inline]
 pub(crate) fn f32_below(x: f64) -> f32 {

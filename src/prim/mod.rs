@@ -17,7 +17,7 @@ pub(crate) use known::Known;
 pub(crate) use names::Names;
 pub(crate) use names::digest;
 pub(crate) use numbers::{Numbers, Vertices};
-pub(crate) use pack::{Packer, pack_in_order};
+pub(crate) use pack::{Packer, pack_in_order, packed};
 pub(crate) use refit::refit_leaves;
 pub(crate) use shapes::{Shapes, Source};
 pub(crate) use validate::leaves_are_sound;
@@ -112,7 +112,8 @@ impl Leaves<'_> {
     /// The box of a block; all of space for one that has none.
     #[inline(always)]
     pub fn aabb(&self, (kind, number): (u32, usize)) -> Aabb {
-        let everywhere = Aabb { lower: [f32::MIN; 3], upper: [f32::MAX; 3] };
+        // Spheres may be hit beyond the largest float.
+        let everywhere = Aabb { lower: [f32::NEG_INFINITY; 3], upper: [f32::INFINITY; 3] };
         let block = self.triangle_blocks.get(number).filter(|_| kind == KIND_TRIANGLES);
         block.map_or(everywhere, |block| block.aabb)
     }

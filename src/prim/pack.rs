@@ -162,6 +162,17 @@ impl<'b> Packer<'b> {
     }
 }
 
+/// What stands for a shape in leaf blocks: for a box a ball around it.
+pub(crate) fn packed(shape: Shape) -> Shape {
+    match shape {
+        Shape::Box(aabb) => {
+            let (centre, radius) = ball_around(&aabb);
+            Shape::Sphere { centre, radius }
+        }
+        shape => shape,
+    }
+}
+
 /// The centre of a box, and its distance from the corners or a little more.
 fn ball_around(aabb: &Aabb) -> ([f32; 3], f32) {
     let (lower, upper) = (wide(aabb.lower), wide(aabb.upper));

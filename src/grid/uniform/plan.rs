@@ -11,9 +11,9 @@ use crate::error::BuildError;
 use crate::grid::narrow::{Axis, Narrow};
 use crate::grid::options::GridOptions;
 use crate::grid::sixteen::{Sixteen, ends, for_each_sixteen};
-use crate::grid::space::{Space, cubes, proportions};
+use crate::grid::space::{Range as Cells, Space, cubes, proportions};
 use crate::math::float::cube_root;
-use crate::prim::{GRAIN, Survey};
+use crate::prim::{GRAIN, Survey, for_each_named_in, packed};
 use crate::scene::Scene;
 use crate::simd::{Kernel, Lanes, Simd, Width, dispatch};
 
@@ -128,6 +128,15 @@ fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) ->
     let narrow = Narrow::new(space);
     let in_part = |ids: Range<usize>| {
         let mut sum = 0u64;
+        if scene.boxes().is_some() {
+            let ids = ids.start as u32..ids.end as u32;
+            for_each_named_in(scene, ids, false, |prim, _| {
+                let Cells { first, last } = narrow.range_of(&packed(prim.shape).aabb());
+                let along = |k: usize| u64::from(last[k] - first[k]) + 1;
+                sum = sum.saturating_add(along(0) * along(1) * along(2));
+            });
+            return sum;
+        }
         for_each_sixteen(scene, ids, sound, |sixteen| {
             sum = sum.saturating_add(cells_of(&narrow, sixteen));
         });
