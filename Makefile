@@ -3,13 +3,14 @@
 
 PREFIX ?= /usr/local
 CARGO ?= cargo
+STRIP ?= strip
 CARGO_TARGET_DIR ?= target
 export CARGO_TARGET_DIR
 
 VERSION := 0.1.0
 MAJOR := 0
-# What the static library asks of the system on Linux (rustc --print native-static-libs).
-PRIVATE := -lgcc_s -lutil -lrt -lpthread -lm -ldl -lc
+# What the static library asks of the system on Linux (rustc --print native-static-libs), but for libgcc_s, which is shared only.
+PRIVATE := -lgcc_eh -lutil -lrt -lpthread -lm -ldl -lc
 
 ROOT := $(DESTDIR)$(PREFIX)
 BUILT := $(CARGO_TARGET_DIR)/release
@@ -24,6 +25,7 @@ install: all
 	install -m 644 include/raykern.h $(ROOT)/include/
 	install -m 644 $(BUILT)/libraykern.a $(ROOT)/lib/
 	install -m 755 $(BUILT)/libraykern.so $(ROOT)/lib/$(SHARED)
+	$(STRIP) -g $(ROOT)/lib/libraykern.a $(ROOT)/lib/$(SHARED)
 	ln -sf $(SHARED) $(ROOT)/lib/libraykern.so.$(MAJOR)
 	ln -sf libraykern.so.$(MAJOR) $(ROOT)/lib/libraykern.so
 	sed -e 's|@PREFIX@|$(PREFIX)|; s|@VERSION@|$(VERSION)|; s|@PRIVATE@|$(PRIVATE)|' \

@@ -6,6 +6,7 @@
 //           without pointers: it may be copied, written to a file or placed in ROM, and opened
 //           again. There is nothing to free.
 // Pointers  None may be null unless its comment says so. All are checked for null and alignment.
+//           During a call nobody writes to what it reads, nor between elements that lie apart.
 // Results   Every call that can fail returns an `RtStatus`. Outputs are written on RT_OK only.
 // Threads   None are started. Calls that take `const RtAccel *` may run at the same time on the same
 //           accel; nobody may write to its block meanwhile.
@@ -13,7 +14,8 @@
 //           included, and everything you do not use to zero: zero always means the default. A larger
 //           struct than the library knows is accepted while the rest of it is zero.
 // Floats    Rounding modes, flushed subnormal numbers and enabled traps neither change an answer nor
-//           are changed; sticky exception flags may be raised when none of these is in use.
+//           are changed; sticky exception flags may be raised when none of these is in use. Callbacks of
+//           a build run in the default state.
 //
 // RtScene scene = {0};                                Then: memory of `need.size` bytes at a multiple
 // scene.struct_size = sizeof scene;                   of `need.alignment`, and
@@ -46,10 +48,11 @@
 // For a structure that is built once: 32 bins, every primitive in them.
 #define RT_QUALITY_BEST 2
 
-// `RtBuildOptions.layout`: bundles of 16. The block says how it is read, not the machine: every
-// machine reads every layout.
+// `RtBuildOptions.layout`: bundles of 16, or as compact in a library built without them. The block says how it is read, not the
+// machine: every machine reads every layout for which its library was built (else RT_ERROR_LAYOUT).
 #define RT_LAYOUT_AUTOMATIC 0
-// Binary nodes of 32 bytes: the least memory and the least stack, for small machines.
+// Binary nodes of 32 bytes: the least stack and the least code, for small machines. Of closed meshes bundles take fewer bytes, of
+// loose triangles these nodes.
 #define RT_LAYOUT_COMPACT 1
 // Bundles of 4 boxes over whole leaf blocks. With little memory the layout may become compact after all.
 #define RT_LAYOUT_WIDE_4 4
@@ -87,7 +90,8 @@
 
 // `RtQuery.facing`: both sides of every surface.
 #define RT_FACING_BOTH 0
-// Only the side from which a triangle's vertices run counter-clockwise; the outside of spheres.
+// Only the side from which a triangle's vertices run counter-clockwise, in an instance before its map, which may mirror; the
+// outside of spheres.
 #define RT_FACING_FRONT 1
 // Only the other side.
 #define RT_FACING_BACK 2
@@ -138,12 +142,16 @@ typedef struct RtSphereSet {
 // A built structure at another place: any map that has an inverse, mirroring, uneven scaling and shear included.
 //
 // The built scene refers to `accel`, which must stay where it is as long as that is used, unless `rt_accel_pack` makes
-// one block of both. `accel` has no instances itself.
+// one block of both. `accel` has no instances itself; of its block only the first bytes are looked at, so what was not built
+// here is opened by `rt_accel_open` first.
 typedef struct RtInstance {
     const RtAccel *accel;
-    // Three rows of four; the last column is the shift.
+    // Three rows of four, for points as columns: x of the world is `m[0] x + m[1] y + m[2] z + m[3]`. RT_ERROR_SINGULAR if it is not
+    // finite, or has no inverse.
     float object_to_world[12];
+    // Seen by queries whose mask shares a bit with this one, of what is in it only what shares one too; 0: by all.
     uint32_t mask;
+    // Zero, as all fields of this name.
     uint32_t reserved;
 } RtInstance;
 
@@ -172,22 +180,24 @@ typedef void (*RtTask)(void *context, uint32_t index);
 
 // The caller's threads: calls `task(context, i)` for each `i` below `count`, in any order and on
 // any thread, and returns when all are done; `context` is dead then. Tasks never block and never
-// nest. The block has the same bytes with any number of threads.
+// nest. What is called twice runs once, what is left out is run by the build. The block has the same bytes with any number of
+// threads. Neither this function nor `progress` may throw an exception or leave by longjmp.
 typedef void (*RtParallelFor)(void *user, uint32_t count, RtTask task, void *context);
 
 // How far a build is, from 0 to 1; false cancels it: RT_ERROR_CANCELLED. Called on the thread that
-// builds, a few times a build.
+// builds, a few times a build, the last time with 1.
 typedef bool (*RtProgress)(void *user, float done);
 
-// What a build may choose. Zero in every field but the first suits most scenes.
+// What a build may choose. Zero in every field but the first suits most scenes. A build gets the options for which its memory was
+// asked; how many threads there are does not matter to that.
 typedef struct RtBuildOptions {
     uint32_t struct_size;
     // One of `RT_QUALITY_`. `rt_build` takes fast for balanced where rays are few.
     uint32_t quality;
     // One of `RT_LAYOUT_`, for a BVH.
     uint32_t layout;
-    // 1: the block can be refitted when vertices move, unless it is a grid: see `rt_accel_refit`. `rt_build` then makes no
-    // grid.
+    // 1: the block can be refitted when vertices move, unless it is a grid or has instances: see `rt_accel_refit`, and `RtInfo.refit`
+    // for what came of it. `rt_build` then makes no grid.
     uint32_t refit;
     // One of `RT_PLAIN_LIST_`.
     uint32_t plain_list;
@@ -195,13 +205,13 @@ typedef struct RtBuildOptions {
     uint32_t worker_count;
     // Handed to the two calls below.
     void *user;
-    // Or null: all is done on the calling thread. Speeds up the build of a BVH, and the check of its scene.
+    // Or null: all is done on the calling thread. Speeds up builds of BVHs and grids, and the check of their scene.
     RtParallelFor parallel_for;
     // Or null.
     RtProgress progress;
     // One of `RT_GRID_`, for a grid.
     uint32_t grid_kind;
-    // Cells for each primitive, of the outermost grid if they are nested, at most 64; not negative. 0: for a uniform grid the cube
+    // Cells for each primitive, of the outermost grid if they are nested, from 0 to 64. 0: for a uniform grid the cube
     // root of the number of primitives along each axis, otherwise a fiftieth.
     float grid_density;
     // How deep grids may be nested, the outermost counted, up to 8; 0: 8.
@@ -226,7 +236,7 @@ typedef struct RtInfo {
     uint32_t struct_size;
     // One of `RT_KIND_`.
     uint32_t kind;
-    // One of `RT_LAYOUT_`, never automatic.
+    // One of `RT_LAYOUT_`, never automatic; of lists and grids it means nothing.
     uint32_t layout;
     // The box around everything that can be hit; `lower > upper` when nothing can.
     float lower[3];
@@ -235,6 +245,7 @@ typedef struct RtInfo {
     uint32_t triangle_count;
     // Spheres that can be hit.
     uint32_t sphere_count;
+    // What they show is in no other count.
     uint32_t instance_count;
     // Triangles and spheres that never are hit: see `RtScene`.
     uint32_t ignored_count;
@@ -271,13 +282,14 @@ typedef struct RtRay {
 typedef struct RtHit {
     // In lengths of the ray's direction.
     float t;
-    // The weight of the triangle's second vertex; 0 on spheres.
+    // The weight of the triangle's second vertex, from 0 to 1 and, if exact, within 2^-23 of the real one; 0 on
+    // spheres.
     float u;
-    // The weight of the triangle's third vertex; 0 on spheres.
+    // The same of the third vertex.
     float v;
     // The number of the triangle or sphere within its geometry.
     uint32_t prim;
-    // The number of the mesh, or `mesh_count` plus the number of the sphere set.
+    // The number of the mesh, or `mesh_count` plus the number of the sphere set; in an instance those of the scene that it shows.
     uint32_t geometry;
     // The number of the instance, RT_NONE outside instances.
     uint32_t instance;
@@ -297,7 +309,7 @@ typedef struct RtQuery {
     uint32_t skip;
     uint32_t skip_prim;
     uint32_t skip_geometry;
-    // RT_NONE outside instances.
+    // RT_NONE outside instances: 0 is the first instance.
     uint32_t skip_instance;
 } RtQuery;
 
@@ -308,7 +320,8 @@ typedef struct RtSurface {
     float position[3];
     // How far `position` may be off the surface, along each axis.
     float position_error;
-    // Of length one: (v1 - v0) x (v2 - v0), or outward on spheres; never flipped to the ray.
+    // Of length one: (v1 - v0) x (v2 - v0), or outward on spheres; never flipped to the ray. In an instance that of its object, by
+    // the inverse transpose of the map: where the map mirrors, vertices run the other way around it.
     float normal[3];
     // `position` moved off the surface to the side of `normal`: where a reflected ray starts.
     float front_origin[3];
@@ -424,7 +437,7 @@ RtStatus rt_needs(const RtScene *scene,
 // Builds a bounding volume hierarchy over `scene` in `memory`, which has `size` bytes and starts at
 // a multiple of 64. `options` may be null.
 //
-// With less than the `size` of `rt_bvh_needs` leaf blocks are fewer and fuller, and in the last
+// When refused, nothing is written; when cancelled, `memory` holds no structure. With less than the `size` of `rt_bvh_needs` leaf blocks are fewer and fuller, and in the last
 // resort the layout is compact; `rt_accel_info` says which it is.
 //
 // The finished block lies at the front of `memory`, and `*out` is its first byte; what lies behind
@@ -451,7 +464,8 @@ RtStatus rt_build_grid(const RtScene *scene,
                        size_t size,
                        const RtAccel **out);
 
-// The bytes of the block that begins at `accel`: what to copy or save. 0 for null.
+// The bytes of the block that begins at `accel`: what to copy or save, unless it refers to others. 0 for null, and for what is no
+// block.
 size_t rt_accel_size(const RtAccel *accel);
 
 // Writes to `*out` what the block holds. `out->struct_size` must be set.
@@ -488,7 +502,7 @@ RtStatus rt_accel_refit(void *memory,
                         size_t size,
                         const RtScene *moved);
 
-// The same on the threads that `options` lend; all else in them is ignored. `options` may be null. The bytes do not depend
+// The same on the threads that `options` lend; all else in them but `struct_size` is ignored. `options` may be null. The bytes do not depend
 // on the number of threads.
 RtStatus rt_accel_refit_with(void *memory,
                              size_t size,

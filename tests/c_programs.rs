@@ -242,6 +242,16 @@ fn install() {
         .arg("-o")
         .arg(&fixed));
     run(&mut Command::new(&fixed));
+    // All of it linked statically, as `pkg-config --static` has it.
+    run(compiler(false)
+        .arg("-static")
+        .args(value("Cflags:"))
+        .arg(&source)
+        .args(value("Libs:"))
+        .args(value("Libs.private:"))
+        .arg("-o")
+        .arg(&fixed));
+    run(&mut Command::new(&fixed));
     make("uninstall");
     assert!(!prefix.join("include/raykern.h").exists());
     assert!(std::fs::read_dir(prefix.join("lib")).unwrap().all(|e| e.unwrap().path().is_dir()));

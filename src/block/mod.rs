@@ -297,7 +297,7 @@ impl Header {
             size: size as u64,
             kind,
             layout,
-            bounds: census.bounds,
+            bounds: census.bounds.without_minus_zero(),
             mesh_count: census.mesh_count,
             triangle_limit: census.triangle_limit,
             prim_limit: census.prim_limit,
@@ -312,7 +312,7 @@ impl Header {
 
     /// What has moved can be hit, or not, at other places.
     pub fn renew(&mut self, bounds: Aabb, triangle_count: u32, sphere_count: u32) {
-        self.bounds = bounds;
+        self.bounds = bounds.without_minus_zero();
         self.reach = bounds.reach();
         self.triangle_count = triangle_count;
         self.sphere_count = sphere_count;

@@ -34,7 +34,7 @@ pub unsafe extern "C" fn rt_accel_refit(
     unsafe { rt_accel_refit_with(memory, size, moved, core::ptr::null()) }
 }
 
-/// The same on the threads that `options` lend; all else in them is ignored. `options` may be null. The bytes do not depend
+/// The same on the threads that `options` lend; all else in them but `struct_size` is ignored. `options` may be null. The bytes do not depend
 /// on the number of threads.
 ///
 /// # Safety

@@ -12,10 +12,11 @@ pub const RT_QUALITY_FAST: u32 = 1;
 /// For a structure that is built once: 32 bins, every primitive in them.
 pub const RT_QUALITY_BEST: u32 = 2;
 
-/// `RtBuildOptions.layout`: bundles of 16. The block says how it is read, not the machine: every
-/// machine reads every layout.
+/// `RtBuildOptions.layout`: bundles of 16, or as compact in a library built without them. The block says how it is read, not the
+/// machine: every machine reads every layout for which its library was built (else RT_ERROR_LAYOUT).
 pub const RT_LAYOUT_AUTOMATIC: u32 = 0;
-/// Binary nodes of 32 bytes: the least memory and the least stack, for small machines.
+/// Binary nodes of 32 bytes: the least stack and the least code, for small machines. Of closed meshes bundles take fewer bytes, of
+/// loose triangles these nodes.
 pub const RT_LAYOUT_COMPACT: u32 = 1;
 /// Bundles of 4 boxes over whole leaf blocks. With little memory the layout may become compact after all.
 pub const RT_LAYOUT_WIDE_4: u32 = 4;
@@ -53,7 +54,8 @@ pub const RT_PRECISION_WATERTIGHT: u32 = 1;
 
 /// `RtQuery.facing`: both sides of every surface.
 pub const RT_FACING_BOTH: u32 = 0;
-/// Only the side from which a triangle's vertices run counter-clockwise; the outside of spheres.
+/// Only the side from which a triangle's vertices run counter-clockwise, in an instance before its map, which may mirror; the
+/// outside of spheres.
 pub const RT_FACING_FRONT: u32 = 1;
 /// Only the other side.
 pub const RT_FACING_BACK: u32 = 2;
@@ -90,13 +92,14 @@ pub struct RtRay {
 pub struct RtHit {
     /// In lengths of the ray's direction.
     pub t: f32,
-    /// The weight of the triangle's second vertex; 0 on spheres.
+    /// The weight of the triangle's second vertex, from 0 to 1 and, if exact, within 2^-23 of the real one; 0 on
+    /// spheres.
     pub u: f32,
-    /// The weight of the triangle's third vertex; 0 on spheres.
+    /// The same of the third vertex.
     pub v: f32,
     /// The number of the triangle or sphere within its geometry.
     pub prim: u32,
-    /// The number of the mesh, or `mesh_count` plus the number of the sphere set.
+    /// The number of the mesh, or `mesh_count` plus the number of the sphere set; in an instance those of the scene that it shows.
     pub geometry: u32,
     /// The number of the instance, RT_NONE outside instances.
     pub instance: u32,
@@ -138,14 +141,18 @@ pub struct RtSphereSet {
 /// A built structure at another place: any map that has an inverse, mirroring, uneven scaling and shear included.
 ///
 /// The built scene refers to `accel`, which must stay where it is as long as that is used, unless `rt_accel_pack` makes
-/// one block of both. `accel` has no instances itself.
+/// one block of both. `accel` has no instances itself; of its block only the first bytes are looked at, so what was not built
+/// here is opened by `rt_accel_open` first.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct RtInstance {
     pub accel: *const RtAccel,
-    /// Three rows of four; the last column is the shift.
+    /// Three rows of four, for points as columns: x of the world is `m[0] x + m[1] y + m[2] z + m[3]`. RT_ERROR_SINGULAR if it is not
+    /// finite, or has no inverse.
     pub object_to_world: [f32; 12],
+    /// Seen by queries whose mask shares a bit with this one, of what is in it only what shares one too; 0: by all.
     pub mask: u32,
+    /// Zero, as all fields of this name.
     pub reserved: u32,
 }
 
@@ -176,15 +183,17 @@ pub type RtTask = Option<unsafe extern "C" fn(context: *mut c_void, index: u32)>
 
 /// The caller's threads: calls `task(context, i)` for each `i` below `count`, in any order and on
 /// any thread, and returns when all are done; `context` is dead then. Tasks never block and never
-/// nest. The block has the same bytes with any number of threads.
+/// nest. What is called twice runs once, what is left out is run by the build. The block has the same bytes with any number of
+/// threads. Neither this function nor `progress` may throw an exception or leave by longjmp.
 pub type RtParallelFor =
     Option<unsafe extern "C" fn(user: *mut c_void, count: u32, task: RtTask, context: *mut c_void)>;
 
 /// How far a build is, from 0 to 1; false cancels it: RT_ERROR_CANCELLED. Called on the thread that
-/// builds, a few times a build.
+/// builds, a few times a build, the last time with 1.
 pub type RtProgress = Option<unsafe extern "C" fn(user: *mut c_void, done: f32) -> bool>;
 
-/// What a build may choose. Zero in every field but the first suits most scenes.
+/// What a build may choose. Zero in every field but the first suits most scenes. A build gets the options for which its memory was
+/// asked; how many threads there are does not matter to that.
 #[derive(Clone, Copy)]
 #[repr(C)]
 pub struct RtBuildOptions {
@@ -193,8 +202,8 @@ pub struct RtBuildOptions {
     pub quality: u32,
     /// One of `RT_LAYOUT_`, for a BVH.
     pub layout: u32,
-    /// 1: the block can be refitted when vertices move, unless it is a grid: see `rt_accel_refit`. `rt_build` then makes no
-    /// grid.
+    /// 1: the block can be refitted when vertices move, unless it is a grid or has instances: see `rt_accel_refit`, and `RtInfo.refit`
+    /// for what came of it. `rt_build` then makes no grid.
     pub refit: u32,
     /// One of `RT_PLAIN_LIST_`.
     pub plain_list: u32,
@@ -202,13 +211,13 @@ pub struct RtBuildOptions {
     pub worker_count: u32,
     /// Handed to the two calls below.
     pub user: *mut c_void,
-    /// Or null: all is done on the calling thread. Speeds up the build of a BVH, and the check of its scene.
+    /// Or null: all is done on the calling thread. Speeds up builds of BVHs and grids, and the check of their scene.
     pub parallel_for: RtParallelFor,
     /// Or null.
     pub progress: RtProgress,
     /// One of `RT_GRID_`, for a grid.
     pub grid_kind: u32,
-    /// Cells for each primitive, of the outermost grid if they are nested, at most 64; not negative. 0: for a uniform grid the cube
+    /// Cells for each primitive, of the outermost grid if they are nested, from 0 to 64. 0: for a uniform grid the cube
     /// root of the number of primitives along each axis, otherwise a fiftieth.
     pub grid_density: f32,
     /// How deep grids may be nested, the outermost counted, up to 8; 0: 8.
@@ -234,7 +243,7 @@ pub struct RtQuery {
     pub skip: u32,
     pub skip_prim: u32,
     pub skip_geometry: u32,
-    /// RT_NONE outside instances.
+    /// RT_NONE outside instances: 0 is the first instance.
     pub skip_instance: u32,
 }
 
@@ -295,7 +304,8 @@ pub struct RtSurface {
     pub position: [f32; 3],
     /// How far `position` may be off the surface, along each axis.
     pub position_error: f32,
-    /// Of length one: (v1 - v0) x (v2 - v0), or outward on spheres; never flipped to the ray.
+    /// Of length one: (v1 - v0) x (v2 - v0), or outward on spheres; never flipped to the ray. In an instance that of its object, by
+    /// the inverse transpose of the map: where the map mirrors, vertices run the other way around it.
     pub normal: [f32; 3],
     /// `position` moved off the surface to the side of `normal`: where a reflected ray starts.
     pub front_origin: [f32; 3],
@@ -310,7 +320,7 @@ pub struct RtInfo {
     pub struct_size: u32,
     /// One of `RT_KIND_`.
     pub kind: u32,
-    /// One of `RT_LAYOUT_`, never automatic.
+    /// One of `RT_LAYOUT_`, never automatic; of lists and grids it means nothing.
     pub layout: u32,
     /// The box around everything that can be hit; `lower > upper` when nothing can.
     pub lower: [f32; 3],
@@ -319,6 +329,7 @@ pub struct RtInfo {
     pub triangle_count: u32,
     /// Spheres that can be hit.
     pub sphere_count: u32,
+    /// What they show is in no other count.
     pub instance_count: u32,
     /// Triangles and spheres that never are hit: see `RtScene`.
     pub ignored_count: u32,

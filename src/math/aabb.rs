@@ -42,6 +42,11 @@ impl Aabb {
         }
     }
 
+    /// The same; which of equal zeros came first is not told.
+    pub fn without_minus_zero(&self) -> Aabb {
+        Aabb { lower: self.lower.map(|x| x + 0.0), upper: self.upper.map(|x| x + 0.0) }
+    }
+
     /// The point of the box that is nearest to `point` along each axis; `lower` where that is NaN.
     pub fn nearest(&self, point: [f32; 3]) -> [f32; 3] {
         let mut nearest = self.lower;

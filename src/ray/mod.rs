@@ -102,9 +102,9 @@ impl Ray {
 pub struct Hit {
     /// The parameter of the hit, in lengths of the ray's direction.
     pub t: f32,
-    /// The weight of the triangle's second vertex; 0 on spheres.
+    /// The weight of the triangle's second vertex, from 0 to 1 and, if exact, within 2^-23 of the real one; 0 on spheres.
     pub u: f32,
-    /// The weight of the triangle's third vertex; 0 on spheres.
+    /// The same of the third vertex.
     pub v: f32,
     /// The number of the triangle or sphere within its geometry.
     pub prim: u32,
