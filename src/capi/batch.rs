@@ -217,8 +217,12 @@ impl<T> Column<T> {
             return false;
         }
         let is_own = answer.checked_sub(ray).is_some_and(|at| at + size_of::<A>() <= stride);
-        let behind =
-            answer.wrapping_sub(ray).cast_signed().rem_euclid(stride.cast_signed()) as usize;
+        // How far an answer begins behind the last ray that begins before it.
+        let behind = match answer.checked_sub(ray) {
+            Some(at) => at.checked_rem(stride),
+            None => (ray - answer).checked_rem(stride).map(|before| stride - before),
+        };
+        let behind = behind.unwrap_or(0);
         is_own || (size_of::<T>() <= behind && behind + size_of::<A>() <= stride)
     }
 
