@@ -37,7 +37,7 @@
 //! | `alloc` | [`OwnedAccel`] | a global allocator |
 //! | `parallel` | `Rayon`, threads for [`BuildOptions::threads`] | std and the crate rayon |
 //! | `libm` | square roots without std | the crate libm |
-//! | `capi` | the C entry points `rt_...` of `include/raykern.h` | about 20 kB |
+//! | `capi` | the C entry points `rt_...` of `include/raykern.h` | 20 to 90 kB: what is called |
 //! | `capi-panic` | a panic handler, for a C library without std | a few bytes |
 //! | `header` | development: writes the C header again | the crate cbindgen |
 

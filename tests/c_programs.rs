@@ -175,6 +175,7 @@ fn picture() {
 #[test]
 fn first_ray() {
     program("first_ray", "examples/first_ray.c", false, &["-std=c11"]);
+    program("first_ray++", "examples/first_ray.cpp", true, &["-std=c++17"]);
 }
 
 #[test]
