@@ -437,7 +437,9 @@ RtStatus rt_needs(const RtScene *scene,
 // Builds a bounding volume hierarchy over `scene` in `memory`, which has `size` bytes and starts at
 // a multiple of 64. `options` may be null.
 //
-// When refused, nothing is written; when cancelled, `memory` holds no structure. With less than the `size` of `rt_bvh_needs` leaf blocks are fewer and fuller, and in the last
+// When refused, nothing is written; when cancelled, `memory` holds no structure.
+//
+// With less than the `size` of `rt_bvh_needs` leaf blocks are fewer and fuller, and in the last
 // resort the layout is compact; `rt_accel_info` says which it is.
 //
 // The finished block lies at the front of `memory`, and `*out` is its first byte; what lies behind
