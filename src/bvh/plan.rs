@@ -103,9 +103,7 @@ impl Plan {
         let leaf_max = leaf_max(census, strip);
         Some(Plan { places, count, apart, leaf_max, uneven, cut, in_runs: false })
     }
-}
 
-impl Plan {
     /// For as few leaves as may be, since there is no room for those of a better tree. Of two kinds each comes to a side of its
     /// own first of all: refs are in the order of their ids.
     fn full(
