@@ -504,8 +504,8 @@ RtStatus rt_accel_refit(void *memory,
                         size_t size,
                         const RtScene *moved);
 
-// The same on the threads that `options` lend; all else in them but `struct_size` is ignored. `options` may be null. The bytes do not depend
-// on the number of threads.
+// The same on the threads that `options` lend; all else in them but `struct_size` is ignored. `options` may be null. The bytes do
+// not depend on the number of threads.
 RtStatus rt_accel_refit_with(void *memory,
                              size_t size,
                              const RtScene *moved,

@@ -141,7 +141,6 @@ fn needs_is_enough_and_the_minimum_too() {
     }
 }
 
-/// A packed block holds each child once, stands alone, can be copied and opened, and answers as before.
 /// Balls around long boxes reach further than these.
 #[test]
 fn needs_is_enough_for_grids_over_poles() {
@@ -176,6 +175,7 @@ fn needs_is_enough_for_grids_over_poles() {
     }
 }
 
+/// A packed block holds each child once, stands alone, can be copied and opened, and answers as before.
 #[test]
 fn packed_blocks_stand_alone() {
     // Which of two children comes first in memory is not the test's to say.

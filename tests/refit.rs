@@ -398,6 +398,13 @@ fn instances_show_what_is_left_of_a_child() {
             for count in 1..=instances.len() {
                 let scene = Scene::new(&[], &[]).with_instances(&instances[..count]);
                 let structures = common::All::build(&scene);
+                for (_, accel) in structures.accels() {
+                    let size = accel.pack_needs().expect("a size").size;
+                    let mut memory = vec![MaybeUninit::new(0u8); size + 64];
+                    let start = memory.as_ptr().align_offset(64);
+                    let packed = accel.pack(&mut memory[start..][..size]).expect("enough");
+                    assert!(Accel::open(packed.block()).is_ok(), "{name} {gone}");
+                }
                 for x in kept {
                     let ray = Ray::new([x + 0.25, 0.25, 9.0], [0.0, 0.0, -1.0]);
                     let hit = common::agreed(&structures.accels(), &ray, &QueryOptions::default());

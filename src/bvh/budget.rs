@@ -14,6 +14,12 @@ pub(super) fn fewest_leaves(count: usize, mixed: bool, leaf_max: usize) -> usize
     }
 }
 
+/// The fewest leaves of `count` refs of one kind where what is parted without a plane is parted at a multiple of `leaf_max`: all
+/// but one are full.
+pub(super) fn full_leaves(count: usize, leaf_max: usize) -> usize {
+    count.div_ceil(leaf_max.max(1))
+}
+
 /// The leaves that a tree over `count` refs may have: `full` is what good trees want, the
 /// other bound the least that works.
 pub(super) fn leaf_budget(count: usize, mixed: bool, leaf_max: usize, full: bool) -> usize {

@@ -16,6 +16,7 @@ use crate::storage::ALIGNMENT;
 /// | header | geometries | prim_ids | bundles | choices | ids | nodes | emitting
 /// | header | geometries | prim_ids | bundles | spheres | triangles | packing
 /// ```
+#[derive(Clone, Copy)]
 pub(super) struct Places {
     pub refs: usize,
     pub nodes: usize,
@@ -33,14 +34,17 @@ impl Places {
         let room = census.hittable() as usize;
         // More leaves, a half of the primitives or all, made no ray through an even scene faster: the collapse puts
         // them together again.
-        let leaves = leaf_budget(room, mixed, leaf_max, false);
-        let places = Places { refs: front(survey)?, nodes: 0, room, leaves };
-        places.fitting(room, leaves, size)
+        Places::with_leaves(survey, census, leaf_budget(room, mixed, leaf_max, false), size)
     }
 
-    /// The places for so many leaves.
-    pub fn full(survey: &Survey, census: &Census, leaves: u32, size: usize) -> Option<Places> {
-        let (room, leaves) = (census.hittable() as usize, leaves as usize);
+    /// The same for so many leaves.
+    pub fn with_leaves(
+        survey: &Survey,
+        census: &Census,
+        leaves: usize,
+        size: usize,
+    ) -> Option<Places> {
+        let room = census.hittable() as usize;
         Places { refs: front(survey)?, nodes: 0, room, leaves }.fitting(room, leaves, size)
     }
 

@@ -3,7 +3,7 @@
 use super::MAX_DEPTH;
 use super::bins::{Bins, Effort, best_plane};
 use super::branch::Branch;
-use super::budget::{fewest_leaves, levels_to_halve};
+use super::budget::{fewest_leaves, full_leaves, levels_to_halve};
 use super::fits::Fits;
 use super::refs::PrimRef;
 use super::spatial::{best_cut, overlap};
@@ -288,7 +288,7 @@ impl Splitter<'_, '_, '_> {
                 Some(Place { left_count: count - spheres, by_kind: true })
             }
             // All leaves but one are full then.
-            None if depth == Depth::Full => Some(at(count.div_ceil(leaf_max) / 2 * leaf_max)),
+            None if depth == Depth::Full => Some(at(full_leaves(count, leaf_max) / 2 * leaf_max)),
             None => Some(at(count / 2)),
         }
     }
@@ -338,7 +338,7 @@ impl Splitter<'_, '_, '_> {
     fn fewest(self, counts: [usize; 2]) -> [usize; 2] {
         let Limits { leaf_max, depth, .. } = *self.limits;
         if WIDE && depth == Depth::Full {
-            return counts.map(|count| count.div_ceil(leaf_max));
+            return counts.map(|count| full_leaves(count, leaf_max));
         }
         let mixed = SPHERES && self.limits.mixed;
         let [left, right] = counts;

@@ -2,6 +2,7 @@
 
 use super::How;
 use super::branch::{Size, grow};
+use super::budget::full_leaves;
 use super::choose::choose;
 use super::collapse::Grounds;
 use super::compact;
@@ -66,12 +67,6 @@ fn planned_leaves(census: &Census) -> [u32; 2] {
     [triangle_blocks, others]
 }
 
-/// The fewest leaves, each of one kind.
-fn least_leaves(census: &Census, leaf_max: usize) -> u32 {
-    let least = |count: u32| count.div_ceil(leaf_max as u32);
-    least(census.triangle_count) + least(census.sphere_count)
-}
-
 /// The parts of the finished block. In an index every leaf is one instance, so its number among the ids says all, and it has no
 /// block.
 fn counts(survey: &Survey, census: &Census, prim_ids: u32, sizes: &Sizes, width: u32) -> Counts {
@@ -124,29 +119,29 @@ fn build<const W: usize>(
 where
     Bundle<W>: Plain,
 {
-    let room = bytes.len();
-    let places = || Places::new(survey, census, leaf_max(census, 1), room);
-    let (first, again) = (places()?, places()?);
+    let (room, leaf_max) = (bytes.len(), leaf_max(census, 1));
+    let places = Places::new(survey, census, leaf_max, room)?;
     how.caller.done(0.1)?;
     let mut built = |places: Places, thrift: Thrift| {
-        let scratch = grow_tree(scene, survey, census, (places, thrift), how, bytes)?;
-        how.caller.done(0.6)?;
-        let size = scratch.finish::<W>(scene, survey, census, how, bytes);
-        if size.is_none() {
+        if thrift != Thrift::Ample {
             bytes.fill(0);
         }
-        Some((size, scratch.cut))
+        let scratch = grow_tree(scene, survey, census, (places, thrift), how, bytes)?;
+        how.caller.done(0.6)?;
+        Some((scratch.finish::<W>(scene, survey, census, how, bytes), scratch.cut))
     };
-    let (size, cut) = built(first, Thrift::Ample)?;
+    let (size, cut) = built(places, Thrift::Ample)?;
     if size.is_some() || how.caller.cancelled() || census.is_index {
         return size;
     }
     // What was cut in two has too many leaves.
-    if cut && let (Some(size), _) = built(again, Thrift::Uncut)? {
+    if cut && let (Some(size), _) = built(places, Thrift::Uncut)? {
         return Some(size);
     }
     // Or any tree has, however leaves are put together.
-    let least = least_leaves(census, leaf_max(census, 1));
+    let [triangles, spheres] = [census.triangle_count, census.sphere_count]
+        .map(|count| full_leaves(count as usize, leaf_max) as u32);
+    let least = triangles + spheres;
     let mut leaves = planned_leaves(census).into_iter().sum::<u32>();
     while finished(survey, census, [leaves, 0], W as u32)? > room {
         leaves = leaves.checked_sub(1 + leaves / 64).filter(|leaves| *leaves >= least)?;
@@ -156,7 +151,7 @@ where
         if how.caller.cancelled() {
             return None;
         }
-        let places = Places::full(survey, census, leaves, room)?;
+        let places = Places::with_leaves(survey, census, leaves as usize, room)?;
         if let (Some(size), _) = built(places, Thrift::Full)? {
             return Some(size);
         }

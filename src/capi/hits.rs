@@ -100,7 +100,7 @@ unsafe fn all_hits(
     let mut last = unsafe { versioned::read(cursor) }?.checked()?;
     // SAFETY: the caller's promise.
     let out = unsafe { Output::new(cursor) }?;
-    // Before anything is written.
+    // Before anything is written, though the list looks for it again: a search between two floats.
     accel.hits_after(ray, &options, &mut last, &mut []).ok_or(Error::NotFound)?;
     // SAFETY: the caller's promise.
     let count = unsafe { list.fill(&mut last) }?;

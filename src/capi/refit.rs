@@ -34,8 +34,8 @@ pub unsafe extern "C" fn rt_accel_refit(
     unsafe { rt_accel_refit_with(memory, size, moved, core::ptr::null()) }
 }
 
-/// The same on the threads that `options` lend; all else in them but `struct_size` is ignored. `options` may be null. The bytes do not depend
-/// on the number of threads.
+/// The same on the threads that `options` lend; all else in them but `struct_size` is ignored. `options` may be null. The bytes do
+/// not depend on the number of threads.
 ///
 /// # Safety
 ///

@@ -22,8 +22,8 @@ pub enum GridKind {
 pub struct GridOptions {
     /// How space is divided.
     pub kind: GridKind,
-    /// Cells for each primitive, of the outermost grid if they are nested; at most 64, which more count as. Zero, or whatever is not above it: for a
-    /// uniform grid the cube root of the number of primitives along each axis, otherwise a fiftieth.
+    /// Cells for each primitive, of the outermost grid if they are nested; at most 64, which more count as. Zero, or whatever is not
+    /// above it: for a uniform grid the cube root of the number of primitives along each axis, otherwise a fiftieth.
     pub density: f32,
     /// How deep grids may be nested, the outermost counted, up to 8; zero means that, as does more.
     pub depth: u32,

@@ -21,7 +21,8 @@ impl Parts {
     }
 
     fn new(root: &Bundle<16>) -> Self {
-        // In a block that moves there may be a child of which nothing can be hit now: its box is empty, and infinite.
+        // In a block that moves there may be a child of which nothing can be hit now: its box is empty, and infinite
+        // along all axes.
         let holds =
             |i: &usize| root.refs[*i] != ChildRef::NONE && root.walls[0][*i] <= root.walls[3][*i];
         let first = (0..16).find(holds).unwrap_or(0);

@@ -130,12 +130,14 @@ fn of_each<A: Asked>(
     // What cannot be is not linked.
     let flies = !SMALL && simd::dispatch(Flies);
     let cached = are_small(level);
+    // What is behind the shorter slice stays as it is.
+    let count = rays.len().min(answers.len());
+    let (rays, answers) = (&rays[..count], &mut answers[..count]);
     for (rays, answers) in rays.chunks(CHUNK).zip(answers.chunks_mut(CHUNK)) {
         if flies && !(cached && are_unlike(rays)) {
             chunk.ask::<A>(rays, answers);
         } else {
-            let count = rays.len().min(answers.len());
-            answers[..count].fill(A::NOTHING);
+            answers.fill(A::NOTHING);
             chunk.ask_alone::<A>(rays, answers, |_| true);
         }
     }

@@ -42,7 +42,7 @@ impl Aabb {
         }
     }
 
-    /// The same; which of equal zeros came first is not told.
+    /// The same without -0: which of equal zeros stays depends on what came first, and bytes shall not.
     pub fn without_minus_zero(&self) -> Aabb {
         Aabb { lower: self.lower.map(|x| x + 0.0), upper: self.upper.map(|x| x + 0.0) }
     }

@@ -90,6 +90,7 @@ impl<'b> Packer<'b> {
     /// Adds a primitive; returns the block it went to, as [`LeafRef::block`] has it, and its lane.
     /// `None` when the blocks are full, which the sizes that `needs` plans exclude.
     pub fn push(&mut self, shape: &Shape) -> Option<(u32, u32)> {
+        // Not by `packed`, which costs small builds 0.9 kB.
         match *shape {
             Shape::Triangle(corners) => self.push_triangle(corners),
             _ if !BALLS => None,

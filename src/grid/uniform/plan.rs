@@ -128,6 +128,7 @@ fn references(scene: &Scene, census: &Census, space: &Space, caller: &Caller) ->
     let narrow = Narrow::new(space);
     let in_part = |ids: Range<usize>| {
         let mut sum = 0u64;
+        // Leaf blocks hold balls around boxes, and the cells of these are what runs list.
         if scene.boxes().is_some() {
             let ids = ids.start as u32..ids.end as u32;
             for_each_named_in(scene, ids, false, |prim, _| {
