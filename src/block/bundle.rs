@@ -46,6 +46,12 @@ impl<const W: usize> Bundle<W> {
         ],
         refs: [ChildRef::NONE; W],
     };
+
+    /// The child in the lowest lane of a mask.
+    #[inline(always)]
+    pub fn child(&self, mask: u32) -> ChildRef {
+        self.refs.get(mask.trailing_zeros() as usize).copied().unwrap_or(ChildRef::NONE)
+    }
 }
 
 /// What a lane of a bundle refers to.

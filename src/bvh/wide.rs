@@ -52,12 +52,22 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         boxes: &impl WideBoxes<S, W>,
         t_bounds: S::V,
     ) -> bool {
-        let (mask, near) = if Q::ANY_BOXES {
+        let entered = Self::entered::<S, Q, W>(bundle, boxes, t_bounds);
+        self.go_on(s, bundle, entered, Q::ORDERED)
+    }
+
+    /// The children that are entered, and where.
+    #[inline(always)]
+    fn entered<S: Width<W>, Q: Query, const W: usize>(
+        bundle: &Bundle<W>,
+        boxes: &impl WideBoxes<S, W>,
+        t_bounds: S::V,
+    ) -> (u32, S::V) {
+        if Q::ANY_BOXES {
             boxes.entered::<true>(&bundle.walls, t_bounds)
         } else {
             boxes.entered::<false>(&bundle.walls, t_bounds)
-        };
-        self.go_on(s, bundle, (mask, near), Q::ORDERED)
+        }
     }
 
     /// Goes from the bundle at hand to what comes next; false if it does not.
@@ -73,7 +83,13 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
     ) -> bool {
         let Some(bundle) = bundles.get(self.at.bundle_number()) else { return false };
         query.watch().step();
-        let goes_on = self.enter::<S, Q, W>(s, bundle, boxes, t_bounds);
+        let (mask, near) = Self::entered::<S, Q, W>(bundle, boxes, t_bounds);
+        if Q::ORDERED && mask.is_power_of_two() {
+            // The usual case near the leaves: what waits is what waited before, and was fetched.
+            self.at = bundle.child(mask);
+            return true;
+        }
+        let goes_on = self.go_on(s, bundle, (mask, near), Q::ORDERED);
         self.fetch_later::<S, Q, W>(s, bundles, leaves);
         goes_on
     }
