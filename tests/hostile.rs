@@ -5,7 +5,10 @@
 mod common;
 
 use common::{All, agreed, odd_models};
-use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Ray, Scene, SphereSet};
+use raykern::{
+    Accel, BuildOptions, Counts, Facing, Hit, Instance, Layout, Mesh, NONE, OwnedAccel, PlainList,
+    Precision, PrimId, QueryOptions, Ray, Scene, SphereSet,
+};
 use raykern_harness::make;
 use raykern_harness::model::Model;
 use raykern_harness::rays::{Family, RayMaker};
@@ -167,5 +170,64 @@ fn spheres_are_met_beyond_the_largest_float() {
         assert_eq!(ask(&all, ray).map(|hit| hit.t), Some(3.0), "{k}");
         let back = Ray::new([0.0, 3e38, 0.0], way.map(|x| -x)).with_limits(2.0, 4.0);
         assert_eq!(ask(&all, back).map(|hit| hit.t), Some(3.0), "{k}");
+    }
+}
+
+/// Hits that round to one `t`, in a block of foreign bytes in which two of their triangles have one number.
+#[test]
+fn lists_end_where_a_number_is_there_twice() {
+    const COUNT: u32 = 24;
+    let depths = (0..COUNT).map(|i| 0.24 - 0.01 * i as f32);
+    let corners = |z: f32| [[-9.0, -9.0, z], [9.0, -9.0, z], [0.0, 9.0, z]];
+    let triangles: Vec<[[f32; 3]; 3]> = depths.map(corners).collect();
+    let meshes = [Mesh::soup(&triangles)];
+    let ids: Vec<u8> = (0..COUNT).flat_map(u32::to_ne_bytes).collect();
+    let list = BuildOptions { plain_list: PlainList::Always, ..BuildOptions::default() };
+    let built = OwnedAccel::bvh(&Scene::new(&meshes, &[]), &list).expect("builds");
+    let child = built.accel();
+    let one = [Instance::new(&child, [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0.])];
+    let scene = Scene::new(&[], &[]).with_instances(&one);
+    let packed = OwnedAccel::bvh(&scene, &list).expect("builds").packed().expect("fits");
+    let ray = Ray::new([0.0, 0.0, 16_777_216.0], [0.0, 0.0, -1.0]);
+    for block in [child.block(), packed.accel().block()] {
+        let mut memory = vec![0; block.len() + 64];
+        let start = memory.as_ptr().align_offset(64);
+        let memory = &mut memory[start..][..block.len()];
+        memory.copy_from_slice(block);
+        let at = block.windows(ids.len()).position(|window| window == ids).expect("all numbers");
+        memory[at + ids.len() - 4..][..4].copy_from_slice(&7u32.to_ne_bytes());
+        let accel = Accel::open(memory).expect("its numbers are those of triangles");
+        let most = 2 * COUNT as usize;
+        let options = QueryOptions::default();
+        assert!(accel.hits(&ray, &options).take(most + 1).count() <= most);
+        assert!(accel.nearest_hits(&ray, &options, &mut [Hit::MISS; 100]) <= most);
+    }
+}
+
+/// From wherever a ray comes, it looks at what is on its way and not at everything.
+#[test]
+fn far_rays_do_not_look_at_everything() {
+    let model: Model = make::sphere(20_000).into();
+    for layout in [Layout::Automatic, Layout::Wide(4), Layout::Compact] {
+        let options = BuildOptions { layout, ..BuildOptions::default() };
+        let built = model.with_scene(|scene| OwnedAccel::bvh(scene, &options)).expect("builds");
+        let accel = built.accel();
+        for distance in [1e3, 1e5, 1e7, 1e9, 1e11] {
+            for way in [[0.6f32, 0.3, 0.2], [-0.1, 0.0, 0.7], [0.0, -1.0, 0.0]] {
+                let ray = Ray::new(way.map(|x| -x * distance), way);
+                let mut counts = Counts::default();
+                let options = QueryOptions::default();
+                let hit = accel.intersect_counted(&ray, &options, &mut counts);
+                assert_eq!(hit, accel.intersect(&ray), "{distance:e} {way:?}");
+                let (steps, tests) = (counts.steps, counts.tests);
+                assert!(
+                    steps + tests < 3_000,
+                    "{distance:e} {way:?}: {steps} steps, {tests} tests"
+                );
+                let mut hits = [Hit::MISS; 64];
+                accel.intersect_batch(&[ray; 64], &mut hits);
+                assert!(hits.iter().all(|h| *h == hit.unwrap_or(Hit::MISS)));
+            }
+        }
     }
 }

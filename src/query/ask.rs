@@ -257,10 +257,20 @@ impl<'m, D: Decide> Locate<'m, D> {
     #[inline(always)]
     fn consider(&mut self, ray: &PreparedRay, met: Option<D::Met>) -> bool {
         let Wanted { t, root, .. } = self.wanted;
-        self.found = met.filter(|met| {
+        let is_wanted = |met: &D::Met| {
             root.is_none_or(|root| root == met.root()) && D::t(ray, met, &mut ()) == t
-        });
-        self.found.is_some()
+        };
+        let Some(met) = met.filter(is_wanted) else { return false };
+        // Blocks of foreign bytes may have one number twice. Lists, which ask for a root, go on behind the last of them, or they
+        // would not end.
+        let is_later = self
+            .found
+            .as_ref()
+            .is_none_or(|found| !D::is_before(ray, &met, found, self.prim_ids, None, &mut ()));
+        if is_later {
+            self.found = Some(met);
+        }
+        root.is_none()
     }
 }
 

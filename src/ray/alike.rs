@@ -1,7 +1,7 @@
 //! What rays have in common that are traced together.
 
 use super::Ray;
-use super::exponents::{is_ordinary, scale_below};
+use super::exponents::{FAR, is_ordinary, scale_below};
 use super::packet::GROUPS;
 use crate::simd::{Lanes, Width};
 
@@ -63,6 +63,7 @@ impl Alike {
         }
         let near = asunder <= ASUNDER * longest && apart <= APART * reach;
         let ordinary = is_ordinary(0.5 * longest) && is_ordinary(longest) && is_ordinary(farthest);
+        let ordinary = ordinary && farthest <= FAR * reach;
         if !(one_way && near && ordinary) {
             return None;
         }

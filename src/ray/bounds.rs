@@ -120,6 +120,76 @@ fn narrow_boxes() {
     worst.assert_tight(0.3);
 }
 
+/// A ray that begins far outside, and a point on it in a scene that reaches not much farther than that.
+fn far_ray(random: &mut Random) -> Option<(PreparedRay, f32, [f64; 3], f64)> {
+    let axis = random.below(3);
+    let mut direction = [0, 1, 2].map(|_| random.wild([-2, 2]));
+    let mut origin = [0, 1, 2].map(|_| random.wild([-2, 2]));
+    // Aimed at the middle, where the direction is not along an axis.
+    let distance = 2f32.powi(random.below(100) as i32);
+    match random.below(3) {
+        0 => {
+            (0..3).filter(|k| *k != axis).for_each(|k| direction[k] = [0.0, -0.0][random.below(2)])
+        }
+        1 => direction[axis] = 0.0,
+        _ => {}
+    }
+    for k in 0..3 {
+        origin[k] = if direction[k] == 0.0 { origin[k] } else { -direction[k] * distance };
+    }
+    let (o, d) = (wide(origin), wide(direction));
+    let t = -o.dot(d) / d.dot(d);
+    let t = t * (1.0 + random.between(-1.0, 1.0) * 2f64.powi(-(20 + random.below(30) as i32)));
+    let point = [0, 1, 2].map(|k| o[k] + d[k] * t);
+    let reach = point.iter().fold(0.0, |m: f64, x| m.max(x.abs())) * random.between(1.0, 9.0);
+    let ray = Ray::new(origin, direction).with_limits(f32::NEG_INFINITY, f32::INFINITY);
+    Some((ray.prepare(reach as f32)?, reach as f32, point, t))
+}
+
+/// Boxes around such points, as small as floats allow.
+#[test]
+fn boxes_of_far_rays() {
+    const SEED: u64 = 23;
+    println!("seed {SEED}");
+    let (mut random, mut far) = (Random::new(SEED), 0);
+    for sample in 0..samples(300_000) {
+        let Some((ray, reach, point, t)) = far_ray(&mut random) else { continue };
+        far += u32::from(ray.given.prepare_with(Scalar, reach).is_none());
+        let mut aabb = Aabb::EMPTY;
+        for (k, x) in point.into_iter().enumerate() {
+            let step = f64::from(ray.given.direction[k]) * t;
+            let off = if step == 0.0 { 0.0 } else { step.abs() * 2f64.powi(-51) };
+            (aabb.lower[k], aabb.upper[k]) = (f32_below(x - off), f32_above(x + off));
+        }
+        let t = t * ray.t_scale;
+        let framed = FrameSlab::new(&ray, reach.max(aabb.reach()));
+        for bound in [f32_above(t), ray.t_max] {
+            let part = framed.part(aabb.corners(), bound);
+            let holds = f64::from(part.near) <= t && t <= f64::from(part.far);
+            assert!(holds, "sample {sample} of seed {SEED}: {ray:?} {aabb:?} {t} {part:?}");
+        }
+        let beside = (0..3).find(|k| aabb.reach() < 0.1 * reach && ray.given.direction[*k] != 0.0);
+        // What is clearly beside the ray is left out, or all of this would be in vain.
+        if let Some(k) = beside.filter(|_| far_enough(&ray, reach)) {
+            let mut moved = aabb;
+            let other = (k + 1) % 3;
+            (moved.lower[other], moved.upper[other]) = (reach, reach);
+            let (lower, upper) = (moved.lower, moved.upper);
+            let part = WideSlab::new(&ray).part([&lower, &upper], ray.t_max);
+            if part.is_empty() {
+                assert!(framed.part([&lower, &upper], ray.t_max).is_empty(), "{ray:?} {moved:?}");
+            }
+        }
+    }
+    assert!(far > 10_000, "{far} rays from far outside");
+}
+
+/// Whether a ray begins far outside, but not so far that its own numbers tell less than a hundredth of the scene.
+fn far_enough(ray: &PreparedRay, reach: f32) -> bool {
+    let farthest = ray.given.origin.iter().fold(0f32, |m, x| m.max(x.abs()));
+    farthest > 8192.0 * reach && farthest < 1e12 * reach
+}
+
 /// `(wall - o) * inverse` against the quotient, without error: `x d` against `(wall - o) t_scale`.
 #[test]
 fn wide_boxes() {

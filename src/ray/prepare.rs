@@ -1,7 +1,8 @@
 //! From a ray as it is given to one that is prepared, in two steps: boxes can be tested before primitives.
 
 use super::exponents::{
-    EXPONENT, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded, scales_below,
+    EXPONENT, FAR, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded,
+    scales_below,
 };
 use super::frame::{PreparedRay, SLOWEST, Shear, TINY};
 use super::slab::{NarrowSlab, Scales};
@@ -31,7 +32,7 @@ impl Ray {
     }
 
     /// What boxes need of an ordinary ray, and what the rest follows from. `None` for a ray that hits nothing by
-    /// definition, and for those at the ends of the floats. `reach` is the largest coordinate of the scene,
+    /// definition, for those at the ends of the floats, and for those that begin [far](FAR) outside. `reach` is the largest coordinate of the scene,
     /// infinite if it is not representable.
     ///
     /// What all rays wait for is the way over the reciprocals to the first boxes; so division waits for nothing, the frame is
@@ -50,10 +51,11 @@ impl Ray {
         let distance = o.abs();
         let fastest = s.largest_of_three(speed);
         let most = splat(ORDINARY);
+        let near = splat(reach * FAR).min(most);
         let reach = s.largest_of_three(distance).max(splat(reach));
         // These comparisons refuse a NaN, which may have been lost above.
         let least = splat(1.0 / ORDINARY).less_or_equal(fastest.min(reach));
-        let sound = distance.less(most) & speed.less(most) & reach.less(most) & least;
+        let sound = distance.less_or_equal(near) & speed.less(most) & reach.less(most) & least;
         if !(sound & 7 == 7 && o.less_or_equal(d) & 8 != 0) {
             return None;
         }
