@@ -9,6 +9,7 @@ mod axis;
 mod bounds;
 mod exponents;
 mod frame;
+mod frame_slab;
 mod packet;
 mod prepare;
 mod slab;
@@ -17,9 +18,10 @@ pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
 pub(crate) use frame::{PreparedRay, TINY};
+pub(crate) use frame_slab::FrameSlab;
 pub(crate) use packet::{Entered, GROUPS, RayPacket, Spread};
 pub(crate) use prepare::{Early, Late};
-pub(crate) use slab::{FrameSlab, NarrowSlab, Slab, WideBoxes, WideSlab};
+pub(crate) use slab::{NarrowSlab, Slab, WideBoxes, WideSlab};
 
 /// The number that stands for "no primitive", "no geometry" and "not in an instance".
 pub const NONE: u32 = u32::MAX;
