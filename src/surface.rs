@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::exact::Line;
 use crate::instance::Map;
 use crate::interval::{sphere, triangle};
+use crate::math::float::limited;
 use crate::math::rounding::{UNIT, UNIT32, f32_above, f32_below};
 use crate::math::wide;
 
@@ -39,9 +40,11 @@ pub(crate) struct Spot {
 impl Spot {
     /// Where the line meets a triangle.
     pub fn on_triangle(line: &Line, corners: [[f32; 3]; 3]) -> Self {
-        let [u, v] = triangle::weights(line, &corners);
+        let [u, v] = triangle::plane(line, &corners).map_or([0.0; 2], |met| met.weights);
+        // Whatever the error of the weights, the point lies in the triangle.
+        let u = limited(u, 0.0, 1.0);
+        let v = limited(v, 0.0, 1.0 - u);
         let [a, b, c] = corners.map(wide);
-        // Whatever the error of the weights, the point lies in the plane.
         let point = a + u * (b - a) + v * (c - a);
         let size = a.abs().max(b.abs()).max(c.abs()).max_element();
         Spot { point, size, blur: 0.0, normal: triangle::normal(corners) }

@@ -5,9 +5,9 @@
 mod common;
 
 use common::{All, agreed, odd_models, ray_towards, strewn};
-use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Scene, SphereSet};
+use raykern::{Facing, Hit, Mesh, NONE, Precision, PrimId, QueryOptions, Ray, Scene, SphereSet};
 use raykern_harness::make::{self, Random};
-use raykern_harness::model::Model;
+use raykern_harness::model::{Model, TriangleMesh};
 use raykern_harness::oracle::{Judgement, Oracle, Tally};
 use raykern_harness::rays::{Family, RayMaker};
 use raykern_harness::threads::map;
@@ -147,4 +147,119 @@ fn the_whole_range_of_floats() {
     let [rays, _, wrong] = judge_all(120, |r, round| wild(r, RANGES[round % 4]));
     println!("{rays} rays, {wrong} wrong");
     assert_eq!(wrong, 0);
+}
+
+const TRIANGLE: [[f32; 3]; 3] = [[-0.9, -0.7, 0.3], [1.1, -0.4, -0.2], [-0.1, 1.3, 0.1]];
+
+/// Holds rays against triangles, by themselves and as a batch, with the positions of the hits: the number of hits.
+fn judge_weights(model: &Model, rays: &[Ray]) -> usize {
+    let (all, oracle) = (All::of(model), Oracle::new(model));
+    let options = QueryOptions::default();
+    let single: Vec<_> = rays.iter().map(|ray| agreed(&all.accels(), ray, &options)).collect();
+    for (name, accel) in all.accels() {
+        let mut hits = vec![Hit::MISS; rays.len()];
+        accel.intersect_batch(rays, &mut hits);
+        for (i, hit) in hits.into_iter().enumerate() {
+            let hit = Some(hit).filter(|hit| hit.prim != NONE);
+            assert_eq!(common::bits(hit), common::bits(single[i]), "{name} {:?}", rays[i]);
+        }
+    }
+    for (ray, hit) in rays.iter().zip(&single) {
+        let judgement = oracle.judge(ray, &options, *hit);
+        assert_eq!(judgement, Judgement::Right, "{ray:?} {hit:?} {:?}", model.meshes);
+        let Some(hit) = hit else { continue };
+        let exact = oracle.closest(ray, &options).hit.expect("the same hit");
+        let TriangleMesh { vertices, indices } = &model.meshes[0];
+        let [a, b, c] = indices[hit.prim as usize].map(|v| vertices[v as usize].map(f64::from));
+        let surface = all.accels()[0].1.surface(ray, hit).expect("the hit is there");
+        for k in 0..3 {
+            let [u, v] = exact.weights;
+            let (e1, e2) = (b[k] - a[k], c[k] - a[k]);
+            let off = (f64::from(surface.position[k]) - (a[k] + u * e1 + v * e2)).abs();
+            let weights = (e1.abs() + e2.abs()) / f64::from(1 << 24);
+            let bound = f64::from(surface.position_error) + weights;
+            assert!(off <= bound, "{ray:?} {hit:?} {surface:?}: {off}");
+        }
+    }
+    single.iter().flatten().count()
+}
+
+fn one(corners: [[f32; 3]; 3]) -> Model {
+    TriangleMesh { vertices: corners.to_vec(), indices: vec![[0, 1, 2]] }.into()
+}
+
+/// From far away, from a vertex, and along a thin triangle: where products of `f64` cancel.
+#[test]
+fn weights_hold_where_doubles_lose_them() {
+    for size in [1e10f32, 1e12, 1e15, 1e18] {
+        let origin = [1.3, 0.7, 2.1].map(|x: f32| x * size);
+        let ray = Ray::new(origin, origin.map(|x| -x)).with_limits(0.0, 2.0);
+        assert_eq!(judge_weights(&one(TRIANGLE), &[ray; 40]), 40);
+    }
+    let sliver = [
+        [-0.024049548, 0.9761148, -0.17821544],
+        [-0.98203206, 0.32642, -0.8250965],
+        [-0.9820321, 0.32641992, -0.8250966],
+    ];
+    let ray = Ray::new(sliver[2], [-0.7550919, -0.5120963, -0.50987846]);
+    assert_eq!(judge_weights(&one(sliver), &[ray; 40]), 40);
+    let edge_on = [
+        [-0.6365854, 0.091890134, -0.25734165],
+        [-0.010555989, 0.8219509, -0.94096243],
+        [-0.044015292, 0.78293127, -0.90442497],
+    ];
+    let origin = [-0.53228015, 0.21352853, -0.37124246];
+    let ray = Ray::new(origin, [0.13821691, 0.16118525, -0.1509321]);
+    assert_eq!(judge_weights(&one(edge_on), &[ray; 40]), 40);
+}
+
+/// The same at random: triangles or slivers, and rays from one origin towards points of one of them.
+#[test]
+fn weights_of_slivers_and_of_rays_from_afar_along_planes_and_from_vertices() {
+    let (mut random, mut hits) = (Random::new(17), [0; 4]);
+    for round in 0..240 {
+        let thin = [0, 1, 20, 23, 25][random.below(5)];
+        let triangle = |random: &mut Random| {
+            let [a, b, c] = [0; 3].map(|_| random.direction());
+            let (part, aside) = (random.unit(), 0.5f64.powi(thin));
+            // As thin as floats allow, where that is so.
+            let c = [0, 1, 2].map(|k| match thin {
+                0 => c[k],
+                _ => a[k] + part * (b[k] - a[k]) + aside * c[k],
+            });
+            [a, b, c].map(|p| p.map(|x| x as f32))
+        };
+        let corners: [_; 4] = std::array::from_fn(|_| triangle(&mut random));
+        let within = |random: &mut Random| {
+            let (u, v) = (random.unit(), random.unit());
+            let [u, v] = if u + v > 1.0 { [1.0 - u, 1.0 - v] } else { [u, v] };
+            let [a, b, c] = corners[0].map(|p| p.map(f64::from));
+            [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]))
+        };
+        let start: [f64; 3] = match round % 4 {
+            0 => random.direction().map(|x| x * 4.0),
+            1 => {
+                let far = 10f64.powf(random.between(5.0, 18.0));
+                random.direction().map(|x| x * far)
+            }
+            // Beside the triangle, in its plane but for rounding.
+            2 => {
+                let (p, q) = (within(&mut random), within(&mut random));
+                [0, 1, 2].map(|k| p[k] + 3.0 * (q[k] - p[k]))
+            }
+            _ => corners[0][random.below(3)].map(f64::from),
+        };
+        let origin = start.map(|x| x as f32);
+        let rays: Vec<_> = (0..40)
+            .map(|_| {
+                let to = within(&mut random);
+                Ray::new(origin, [0, 1, 2].map(|k| (to[k] - f64::from(origin[k])) as f32))
+            })
+            .collect();
+        let vertices = corners.as_flattened().to_vec();
+        let indices = (0..4).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        hits[round % 4] += judge_weights(&TriangleMesh { vertices, indices }.into(), &rays);
+    }
+    println!("{hits:?} hits: thin, from afar, along the plane, from a vertex");
+    assert!(hits.iter().all(|hits| *hits > 200), "{hits:?}: too easy");
 }

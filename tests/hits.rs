@@ -39,7 +39,7 @@ fn check_exact(hits: &[Hit], exact: &[ExactHit], place: &str) {
         .collect();
     assert_eq!(seen, expected, "{place}");
     for (hit, exact) in hits.iter().zip(exact) {
-        let bound = f64::from(f32::EPSILON) + exact.weight_noise;
+        let bound = f64::from(f32::EPSILON);
         let [u, v] = exact.weights;
         assert!((f64::from(hit.u) - u).abs() <= bound, "{place} {hit:?} {u}");
         assert!((f64::from(hit.v) - v).abs() <= bound, "{place} {hit:?} {v}");

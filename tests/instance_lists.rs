@@ -222,3 +222,49 @@ fn closest_points_of_ellipsoids() {
         });
     }
 }
+
+/// Through maps that make squares of distances overflow, all structures find what is closest.
+#[test]
+fn closest_points_through_extreme_maps() {
+    let mut random = Random::new(24);
+    let mut vertices = Vec::new();
+    for _ in 0..40 {
+        let middle = [0; 3].map(|_| random.between(-0.9, 0.9));
+        for _ in 0..3 {
+            vertices.push(middle.map(|x| (x + random.between(-0.1, 0.1)) as f32));
+        }
+    }
+    let indices = (0..40).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let child: Model = TriangleMesh { vertices, indices }.into();
+    for (e, b) in [(1e-33, 3e27), (1e-38, 1e20), (1e-30, 1e32)] {
+        let map = [e, b, 0.0, 0.0, 0.0, e, b, 0.0, 0.0, 0.0, e, 0.0];
+        let never =
+            |layout| BuildOptions { plain_list: PlainList::Never, layout, ..Default::default() };
+        let list = BuildOptions { plain_list: PlainList::Always, ..Default::default() };
+        let built = child.with_scene(|scene| {
+            let bvh = |options| OwnedAccel::bvh(scene, &options).expect("a BVH");
+            [
+                bvh(list),
+                bvh(never(Layout::Compact)),
+                bvh(never(Layout::Wide(4))),
+                bvh(never(Layout::Wide(8))),
+                bvh(never(Layout::Wide(16))),
+                OwnedAccel::grid(scene, &never(Layout::Compact)).expect("a grid"),
+            ]
+        });
+        let found = built.each_ref().map(|child| {
+            let child = child.accel();
+            let instances = [Instance::new(&child, map)];
+            Model::default().with_scene(|scene| {
+                let all = All::build(&scene.with_instances(&instances));
+                let options = QueryOptions::default();
+                all.accels().map(|(_, accel)| {
+                    point_bits(accel.closest_point([1.0, 2.0, 3.0], f32::INFINITY, &options))
+                })
+            })
+        });
+        let first = found[0][0];
+        assert!(first.is_some(), "{e} {b}");
+        assert!(found.as_flattened().iter().all(|bits| *bits == first), "{e} {b}: {found:?}");
+    }
+}

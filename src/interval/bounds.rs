@@ -53,6 +53,7 @@ fn triangles() {
     let mut random = Random::new(SEED);
     let mut volume = Worst::new("triangle, f64: volume");
     let mut t = Worst::new("triangle, f64: t");
+    let mut weight = Worst::new("triangle, f64: weights");
     for _ in 0..samples(60_000) {
         let [origin, a, b, c] = points(&mut random);
         let corners = [a, b, c];
@@ -68,8 +69,8 @@ fn triangles() {
             &volume + &volume
         };
         let real = [twice(&rc, &ra), twice(&ra, &rb), twice(&rb, &rc)];
-        for (computed, real) in volumes(&line, corners).into_iter().zip(real) {
-            let off = &Dyadic::from_f64(computed) - &real;
+        for (computed, real) in volumes(&line, corners).into_iter().zip(&real) {
+            let off = &Dyadic::from_f64(computed) - real;
             volume.see(if off.sign() == 0 { 0.0 } else { off.ratio(&bound) }, 1.0);
         }
         let n = cross(&difference(&rb, &ra), &difference(&rc, &ra));
@@ -84,9 +85,15 @@ fn triangles() {
         assert!(met.is_none_or(|(met, _)| met.front == (divisor.sign() < 0)));
         let off = &(&Dyadic::from_f64(plane.t) * &divisor) - &dividend;
         t.see(off.ratio(&divisor), plane.t_error);
+        for (computed, real) in plane.weights.into_iter().zip(&real).filter(|_| met.is_some()) {
+            let twice = &divisor + &divisor;
+            let off = &(&Dyadic::from_f64(computed) * &twice) - real;
+            weight.see(off.ratio(&twice), f64::from(f32::EPSILON) / 4.0);
+        }
     }
     volume.assert_tight(0.05);
     t.assert_tight(0.05);
+    weight.assert_tight(0.002);
 }
 
 #[test]

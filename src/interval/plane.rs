@@ -11,11 +11,12 @@ pub(crate) struct PlaneMeeting<D> {
     pub t: D,
     /// What `t` may be off, where that is `clear`.
     pub t_error: D,
-    /// The weights of the second and the third vertex, not yet between 0 and 1; not finite where the plane is parallel.
+    /// The weights of the second and the third vertex, not yet between 0 and 1, where that is `clear`.
     pub weights: [D; 2],
     /// The line's direction along the normal: negative where it meets the front.
     pub along: D,
-    /// One bit for each lane, unless the plane is nearly parallel to the line.
+    /// One bit for each lane in which `t` is within `t_error`, and the weights are within 2^-25 if the line passes between the
+    /// edges: unless the plane is nearly parallel to the line, the triangle thin or the line's origin far away.
     pub clear: u32,
 }
 
@@ -63,17 +64,21 @@ impl PlaneMeeting<f64> {
     }
 }
 
-/// What `t` may be off, and whether that is clear, one bit a lane; from the sums of absolute coordinates of the direction, of the way to the plane
-/// and of both edges.
+/// One over what weights may be off: half a unit of roundoff of `f32`.
+const WEIGHTS: f64 = (1u64 << 25) as f64;
+
+/// What `t` may be off, and whether that and the weights are clear, one bit a lane; from the sums of absolute coordinates of the direction, of the
+/// way to the plane and of both edges.
 #[inline(always)]
 fn error<D: Doubles>(t: D, along: D, [direction, to_plane, e1, e2]: [D; 4]) -> (D, u32) {
-    // Four roundings in the normal, one in the way to the plane, three in either dot product.
-    let size = e1.times(gamma(8)).mul(e2);
-    let along_error = direction.mul(size);
-    let clear = along_error.times(1024.0).less(along.abs());
+    // Four roundings in the normal, one in the way to the plane, three in either dot product. In a weight's dividend there are
+    // as many, of an edge and the way to the plane; the sum of both edges stands for the longer one.
+    let size = e1.mul(e2);
+    let weight = to_plane.mul(e1.add(e2)).add(size);
+    let clear = direction.mul(weight).times(gamma(8) * WEIGHTS).less(along.abs());
     // A hundredth for the divisor's own error, and the roundings of the quotient. What does not wait for `t` is divided
     // beside it.
-    let part = size.times(1.01).div(along.abs());
+    let part = size.times(1.01 * gamma(8)).div(along.abs());
     let reach = to_plane.add(t.abs().mul(direction));
     (reach.mul(part).add(t.abs().times(3.0 * UNIT)), clear)
 }

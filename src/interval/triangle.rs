@@ -14,7 +14,7 @@ use crate::math::{sum_abs, wide};
 pub(crate) struct TriangleMeeting {
     pub t: f64,
     pub t_error: f64,
-    /// The weights of the second and the third vertex, not yet between 0 and 1.
+    /// The weights of the second and the third vertex, not yet between 0 and 1. Within 2^-25 if the line meets the triangle.
     pub weights: [f64; 2],
     pub front: bool,
     /// Whether it took real arithmetic to know.
@@ -130,17 +130,6 @@ fn exactly_met(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<Feature> {
     })
 }
 
-/// The weights of the second and the third vertex where the line meets the triangle, by the same operations
-/// whatever decided that it does; 0 when they cannot be told.
-pub(crate) fn weights(line: &Line, triangle: &[[f32; 3]; 3]) -> [f64; 2] {
-    told(&plane_meeting(line, triangle))
-}
-
-/// The weights of a meeting, or 0.
-fn told(PlaneMeeting { weights, along, .. }: &PlaneMeeting<f64>) -> [f64; 2] {
-    if *along == 0.0 { [0.0; 2] } else { *weights }
-}
-
 /// In line where room is no matter.
 #[cfg_attr(target_pointer_width = "64", inline(always))]
 #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
@@ -155,36 +144,26 @@ fn plane_meeting(line: &Line, [a, b, c]: &[[f32; 3]; 3]) -> PlaneMeeting<f64> {
 #[cfg_attr(target_pointer_width = "64", inline)]
 #[cfg_attr(not(target_pointer_width = "64"), inline(never))]
 pub(crate) fn plane(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    let met = plane_meeting(line, triangle);
-    clearly(&met).or_else(|| exact_plane(line, triangle, told(&met)))
+    clear_plane(line, triangle).or_else(|| exact_plane(line, triangle))
 }
 
-/// The same, or `None` where the plane is nearly parallel to the line.
+/// The same, or `None` where `f64` does not tell `t` and the weights.
 #[inline(always)]
 pub(crate) fn clear_plane(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<TriangleMeeting> {
-    clearly(&plane_meeting(line, triangle))
-}
-
-/// A meeting, if it is clear.
-#[inline(always)]
-fn clearly(met: &PlaneMeeting<f64>) -> Option<TriangleMeeting> {
-    let PlaneMeeting { t, t_error, weights, along, clear } = *met;
+    let PlaneMeeting { t, t_error, weights, along, clear } = plane_meeting(line, triangle);
     let exact = false;
     (clear != 0).then_some(TriangleMeeting { t, t_error, weights, front: along < 0.0, exact })
 }
 
-/// The meeting with the plane, without error but in the weights.
+/// The meeting with the plane, from numbers without error.
 #[cold]
 #[inline(never)]
-fn exact_plane(
-    line: &Line,
-    triangle: &[[f32; 3]; 3],
-    weights: [f64; 2],
-) -> Option<TriangleMeeting> {
+fn exact_plane(line: &Line, triangle: &[[f32; 3]; 3]) -> Option<TriangleMeeting> {
     let (t, t_error) = exact::to_plane(line, triangle)?;
-    // None of the volumes is of the other sign.
-    let front = exact::volumes(line, triangle).iter().any(|v| *v < 0.0);
-    Some(TriangleMeeting { t, t_error, weights, front, exact: true })
+    // Where the triangle is met none of the volumes is of the other sign, so nothing cancels in their sum.
+    let [u, v, w] = exact::volumes(line, triangle);
+    let all = u + v + w;
+    Some(TriangleMeeting { t, t_error, weights: [u / all, v / all], front: all < 0.0, exact: true })
 }
 
 /// Whether the triangle has area. Exact for all finite vertices.
@@ -243,7 +222,7 @@ mod tests {
     fn shot(origin: [f32; 3], direction: [f32; 3]) -> Option<(f64, [f64; 2], bool)> {
         let line = Line { origin, direction };
         let (meeting, _) = meet(&line, &TRIANGLE)?;
-        Some((meeting.t, weights(&line, &TRIANGLE), meeting.front))
+        Some((meeting.t, meeting.weights, meeting.front))
     }
 
     #[test]

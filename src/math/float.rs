@@ -29,7 +29,7 @@ fn less_by_bits(x: f32, y: f32) -> bool {
 /// `x`, but not below `low` nor above `high`, which are in that order; NaN becomes `low`.
 #[cfg_attr(target_os = "none", inline(never))]
 #[cfg_attr(not(target_os = "none"), inline)]
-pub(crate) fn limited(x: f32, low: f32, high: f32) -> f32 {
+pub(crate) fn limited<T: PartialOrd>(x: T, low: T, high: T) -> T {
     // As compilers write `max` and `min` these ask twice whether something is NaN.
     let x = if x > low { x } else { low };
     if x < high { x } else { high }

@@ -116,7 +116,9 @@ impl Around {
             let wall = |k: usize| walls[k][lane];
             let (lower, upper) = ([wall(0), wall(1), wall(2)], [wall(3), wall(4), wall(5)]);
             let square = self.square_to(&Aabb { lower, upper });
-            mask |= u32::from(square < f64::INFINITY && self.is_within(square)) << lane;
+            // Through an extreme map the square of a box that is not empty may be infinite, as the bound is then.
+            let is_empty = lower[0] > upper[0];
+            mask |= u32::from(!is_empty && self.is_within(square)) << lane;
             *narrow = f32_below(square).min(f32::MAX);
         }
         (mask, squares)

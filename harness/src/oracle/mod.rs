@@ -43,8 +43,6 @@ pub struct ExactHit {
     pub t: Root,
     /// The weights of a triangle's second and third vertex to about 1e-15; zeros on spheres.
     pub weights: [f64; 2],
-    /// What a weight computed in `f64` may be off.
-    pub weight_noise: f64,
     /// Whether the ray meets the front.
     pub front: bool,
 }
@@ -137,13 +135,8 @@ fn meetings(ray: &Ray, place: Place, shape: Shape, options: &QueryOptions) -> Ve
         Shape::Triangle(_) if skipped => Vec::new(),
         Shape::Triangle(corners) => {
             let hit = triangle::meet(&origin, &direction, corners);
-            let exact = hit.map(|hit| ExactHit {
-                place,
-                t: hit.t,
-                weights: hit.weights,
-                weight_noise: hit.weight_noise,
-                front: hit.front,
-            });
+            let exact =
+                hit.map(|hit| ExactHit { place, t: hit.t, weights: hit.weights, front: hit.front });
             exact.into_iter().collect()
         }
         Shape::Sphere(sphere) => {
@@ -152,7 +145,7 @@ fn meetings(ray: &Ray, place: Place, shape: Shape, options: &QueryOptions) -> Ve
             };
             let touches = enter == leave;
             let leave_is_nearer = leave.magnitude() < enter.magnitude();
-            let at = |t, front| ExactHit { place, t, weights: [0.0; 2], weight_noise: 0.0, front };
+            let at = |t, front| ExactHit { place, t, weights: [0.0; 2], front };
             let mut hits = Vec::new();
             if !(skipped && (touches || !leave_is_nearer)) {
                 hits.push(at(enter, true));

@@ -1,6 +1,6 @@
 //! Ray against triangle, in real arithmetic.
 
-use super::dyadic::{Dyadic, Vector, cross, difference, dot, vector};
+use super::dyadic::{Vector, cross, difference, dot, vector};
 use super::root::Root;
 
 /// Where a line meets a triangle.
@@ -10,9 +10,6 @@ pub struct TriangleMeeting {
     pub t: Root,
     /// The weights of the second and the third vertex, to about 1e-15.
     pub weights: [f64; 2],
-    /// What a weight computed in `f64` may be off: 64 units of the greatest product in its
-    /// numerator, over its denominator.
-    pub weight_noise: f64,
     /// Whether the line comes from the side where the vertices run counter-clockwise.
     pub front: bool,
 }
@@ -36,16 +33,8 @@ pub fn meet(
     if weights.iter().any(|w| w.sign() * slope.sign() < 0) {
         return None;
     }
-    let largest = |v: &Vector| {
-        v.iter().map(|x| if x.sign() < 0 { -x.clone() } else { x.clone() }).max().expect("three")
-    };
-    let reach = [&a, &b, &c].map(largest).into_iter().max().expect("three");
-    let noise = &(&reach * &reach) * &largest(direction);
-    let one = Dyadic::from_f32(1.0);
-    let size = noise.ratio(&one) / slope.ratio(&one).abs();
     Some(TriangleMeeting {
         weights: [weights[1].ratio(&slope), weights[2].ratio(&slope)],
-        weight_noise: 64.0 * f64::EPSILON * size,
         front: slope.sign() < 0,
         t: Root::rational(dot(&a, &normal), slope),
     })
