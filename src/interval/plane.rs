@@ -64,7 +64,7 @@ impl PlaneMeeting<f64> {
     }
 }
 
-/// One over what weights may be off: half a unit of roundoff of `f32`.
+/// One over what weights may be off: half a unit of roundoff of `f32`, so that its rounding and `1 - u` stay within 2^-23.
 const WEIGHTS: f64 = (1u64 << 25) as f64;
 
 /// What `t` may be off, and whether that and the weights are clear, one bit a lane; from the sums of absolute coordinates of the direction, of the

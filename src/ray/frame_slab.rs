@@ -15,7 +15,8 @@ use crate::simd::{SMALL, Scalar, Width};
 /// A ray that begins [far](FAR) outside is followed from near the scene on, or all of that would be within what a wall is padded by.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameSlab {
-    /// Of each axis the reciprocal, with the sign of the direction, and the shifts of near and far walls: see [`NarrowSlab`].
+    /// Of each axis the reciprocal, with the sign of the direction, and the shifts of near and far walls: see
+    /// [`NarrowSlab`](super::NarrowSlab).
     axes: [[f32; 3]; 3],
     t_min: f32,
     scale: Option<f32>,
@@ -129,7 +130,7 @@ impl Slab for FrameSlab {
         let t_bound = f32_above(f64::from(t_bound) - start);
         let part = self.between(corners, [t_min, t_bound]);
         if part.is_empty() {
-            // What the origin is far from would be rounded together.
+            // Seen from the origin all of the scene may be within one float of `t`, and the part would not be empty any more.
             return Interval { near: f32::INFINITY, far: f32::NEG_INFINITY };
         }
         let there = |t: f32| f64::from(t) + start;

@@ -32,8 +32,8 @@ impl Ray {
     }
 
     /// What boxes need of an ordinary ray, and what the rest follows from. `None` for a ray that hits nothing by
-    /// definition, for those at the ends of the floats, and for those that begin [far](FAR) outside. `reach` is the largest coordinate of the scene,
-    /// infinite if it is not representable.
+    /// definition, for those at the ends of the floats, and for those that begin [far](FAR) outside. `reach` is the largest
+    /// coordinate of the scene, infinite if it is not representable.
     ///
     /// What all rays wait for is the way over the reciprocals to the first boxes; so division waits for nothing, the frame is
     /// found meanwhile, and both meet behind it. All is done in vectors, also what is one number, and
