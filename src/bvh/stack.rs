@@ -27,6 +27,7 @@ impl<const ROOM: usize> Columns<ROOM> {
 
 /// Children to come back to, each with the `t` at which the ray enters it.
 ///
+/// The first entry is [`ChildRef::NONE`], which stays: so there always is one to take, and no branch tells whether.
 /// All `refs` below `count` are written, and all of `near` too unless children were
 /// [pushed without](Self::push_but_last). A push writes as many lanes as a vector has and then counts those that matter,
 /// so that it takes no branch. The columns are borrowed, so that what is left can stay in registers.
@@ -41,26 +42,31 @@ impl<'m, const ROOM: usize> Stack<'m, ROOM> {
     #[inline(always)]
     pub fn new(columns: &'m mut Columns<ROOM>) -> Self {
         let Columns { near, refs } = columns;
-        Stack { near, refs, count: 0 }
+        // Never culled.
+        near[0].write(f32::NEG_INFINITY);
+        refs[0].write(ChildRef::NONE.0);
+        Stack { near, refs, count: 1 }
     }
 
     #[inline(always)]
     pub fn clear(&mut self) {
-        self.count = 0;
+        self.count = 1;
     }
 
     /// The child pushed last, or [`ChildRef::NONE`] when there is none.
     #[inline(always)]
     pub fn pop(&mut self) -> ChildRef {
-        let Some(last) = self.count.checked_sub(1) else { return ChildRef::NONE };
-        self.count = last;
-        ChildRef(self.reference(last))
+        let top = self.top();
+        self.count -= usize::from(self.count > 1);
+        top
     }
 
     /// The child that would be taken next, or [`ChildRef::NONE`].
     #[inline(always)]
     pub fn top(&self) -> ChildRef {
-        self.count.checked_sub(1).map_or(ChildRef::NONE, |last| ChildRef(self.reference(last)))
+        debug_assert!(self.count > 0);
+        // SAFETY: the first entry is written, and both ways to push write the refs that they count.
+        ChildRef(unsafe { self.refs[self.count - 1].assume_init() })
     }
 
     /// Pushes the children in the lanes of `mask`, two at least, far ones first but for the nearest, which it returns;
@@ -104,13 +110,5 @@ impl<'m, const ROOM: usize> Stack<'m, ROOM> {
         // SAFETY: entries below `count` were written by a push, or moved down from such ones; queries that
         // push without `near` have a bound that does not move, and do not come here.
         self.count = unsafe { s.keep_up_to(near, refs, t_bound) };
-    }
-
-    /// Entry `i`, which is or was the last below `count`.
-    #[inline(always)]
-    fn reference(&self, i: usize) -> u32 {
-        debug_assert!(i <= self.count);
-        // SAFETY: both ways to push write the refs that they count; taking an entry does not unwrite it.
-        unsafe { self.refs[i].assume_init() }
     }
 }

@@ -18,8 +18,9 @@ pub(crate) struct Walk<'m, const ROOM: usize> {
     t_bound: f32,
 }
 
-/// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry.
-pub(crate) const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 2 * 16;
+/// A ray leaves at most 15 siblings a level behind; a push of 16 lanes writes past the last entry. What is at the bottom of the
+/// stack has room too.
+pub(crate) const ENOUGH_ROOM: usize = 15 * super::MAX_DEPTH + 3 * 16;
 
 impl<'m, const ROOM: usize> Walk<'m, ROOM> {
     /// At the root.
@@ -137,16 +138,18 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
         (mask, near): (u32, S::V),
         ordered: bool,
     ) -> bool {
-        if mask & mask.wrapping_sub(1) == 0 {
-            let only = bundle.refs.get(mask.trailing_zeros() as usize);
-            self.at = only.copied().unwrap_or_else(|| self.stack.pop());
+        if mask == 0 {
+            self.at = self.stack.pop();
             return true;
         }
-        let next = if ordered {
-            self.stack.push_but_nearest(s, mask, near, &bundle.refs)
-        } else {
-            // Without a bound that moves, it does not matter where they are entered.
+        let next = if !ordered {
+            // Without a bound that moves, it does not matter where they are entered; and how many they are is guessed wrong more often
+            // than it matters.
             self.stack.push_but_last(s, mask, &bundle.refs)
+        } else if mask.is_power_of_two() {
+            Some(bundle.child(mask))
+        } else {
+            self.stack.push_but_nearest(s, mask, near, &bundle.refs)
         };
         self.at = next.unwrap_or(ChildRef::NONE);
         next.is_some()
