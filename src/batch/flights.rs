@@ -82,7 +82,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
         while let Some(given) = self.rays.get(*next) {
             flight.number = *next;
             *next += 1;
-            let Some((ray, slab)) = given.prepare_with(s, self.block.header.reach) else {
+            let Some((ray, slab)) = given.prepare_with(s, self.block.header.extent()) else {
                 self.answer_alone(flight.number);
                 continue;
             };

@@ -154,7 +154,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
         let mut end = if self.manner == Manner::AsTheyAre { first } else { count };
         while end < count {
             let rays = &self.rays[end..count];
-            if let Some((alike, length)) = Alike::first_of(s, rays, self.block.header.reach) {
+            if let Some((alike, length)) = Alike::first_of(s, rays, self.block.header.extent()) {
                 return if end == first { (Some(alike), end + length) } else { (None, end) };
             }
             end = count.min(end + 16);

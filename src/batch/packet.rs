@@ -244,12 +244,12 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
     #[cold]
     #[inline(never)]
     fn ask_alone(&mut self, group: usize, rays: u32, leaf: LeafRef) {
-        let (mut rest, reach) = (rays, self.batch.block.header.reach);
+        let (mut rest, extent) = (rays, self.batch.block.header.extent());
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize % 16;
             rest &= rest - 1;
             let Some(given) = self.batch.rays.get(16 * group + lane) else { return };
-            let Some(ray) = given.prepare(reach) else { continue };
+            let Some(ray) = given.prepare(extent) else { continue };
             let mut query = self.batch.question.query(self.batch.block.whole, ray.t_max);
             if let Some(leaf) = self.leaf(group, lane) {
                 self.leaves.intersect(Scalar, leaf, &ray, &mut query);
@@ -309,7 +309,7 @@ impl<'m, Q: Together<'m>, A: Record<Q::Answer>> Company<'_, 'm, Q, A> {
     #[inline(never)]
     fn settle_alone(&mut self, number: usize, leaf: LeafRef) {
         let Batch { block, rays, question, .. } = self.batch;
-        let Some(ray) = rays[number].prepare(block.header.reach) else { return };
+        let Some(ray) = rays[number].prepare(block.header.extent()) else { return };
         let mut query = question.query(block.whole, ray.t_max);
         let ended = self.leaves.intersect(Scalar, leaf, &ray, &mut query);
         self.batch.write(number, Q::answer(Scalar, block.whole, &ray, &mut query, ended));

@@ -63,7 +63,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>> Batch<'_, 'm, Q, A> {
         let mut joined = 0;
         for (lane, member) in members.iter_mut().enumerate() {
             let Some(given) = self.rays.get(first + lane) else { break };
-            let Some((ray, slab)) = given.prepare_with(s, self.block.header.reach) else {
+            let Some((ray, slab)) = given.prepare_with(s, self.block.header.extent()) else {
                 self.answer_alone(first + lane);
                 continue;
             };

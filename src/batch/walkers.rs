@@ -167,7 +167,7 @@ impl<'m, Q: Question<'m> + Copy, A: Record<Q::Answer>, S: Simd> Walkers<'_, 'm, 
         while let Some(given) = self.batch.rays.get(self.next) {
             let number = self.next;
             self.next += 1;
-            let Some((ray, slab)) = given.prepare_with(s, self.batch.block.header.reach) else {
+            let Some((ray, slab)) = given.prepare_with(s, self.batch.block.header.extent()) else {
                 self.batch.answer_alone(number);
                 continue;
             };

@@ -31,6 +31,7 @@ use leaf::{SphereBlock, TriangleBlock};
 
 use crate::kinds::{BALLS, GRID, REFIT, WIDE};
 use crate::math::Aabb;
+use crate::ray::Extent;
 use crate::storage::{self, ALIGNMENT, Plain, align_up};
 
 const MAGIC: [u8; 8] = *b"raykern\0";
@@ -288,6 +289,12 @@ pub(crate) struct Census {
 }
 
 impl Header {
+    /// How far the scene reaches, for rays.
+    #[inline(always)]
+    pub fn extent(&self) -> Extent {
+        Extent::new(self.reach, self.counts.prim_ids)
+    }
+
     /// The header of a finished block.
     pub fn new(kind: u32, layout: u32, census: &Census, counts: Counts, size: usize) -> Header {
         Header {

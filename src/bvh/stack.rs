@@ -112,3 +112,32 @@ impl<'m, const ROOM: usize> Stack<'m, ROOM> {
         self.count = unsafe { s.keep_up_to(near, refs, t_bound) };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::Scalar;
+
+    #[test]
+    fn what_is_at_the_bottom_stays() {
+        let refs = [7, 8, 9, 10].map(ChildRef);
+        let near = [4.0, 1.0, 3.0, 2.0];
+        let mut columns = Columns::<16>::UNWRITTEN;
+        let mut stack = Stack::new(&mut columns);
+        for _ in 0..3 {
+            assert_eq!((stack.top(), stack.pop()), (ChildRef::NONE, ChildRef::NONE));
+        }
+        assert_eq!(stack.push_but_nearest(Scalar, 0b1111, near, &refs), Some(ChildRef(8)));
+        stack.cull(Scalar, 3.5);
+        assert_eq!((stack.top(), stack.pop()), (ChildRef(10), ChildRef(10)));
+        stack.cull(Scalar, f32::NEG_INFINITY);
+        assert_eq!((stack.pop(), stack.pop()), (ChildRef::NONE, ChildRef::NONE));
+        // Each but the last, and alone none at all.
+        assert_eq!(stack.push_but_last(Scalar, 0b0110, &refs), Some(ChildRef(9)));
+        assert_eq!(stack.push_but_last(Scalar, 0b0001, &refs), Some(ChildRef(7)));
+        assert_eq!([stack.pop(), stack.pop()], [ChildRef(8), ChildRef::NONE]);
+        stack.push_but_last(Scalar, 0b1111, &refs);
+        stack.clear();
+        assert_eq!(stack.pop(), ChildRef::NONE);
+    }
+}

@@ -19,7 +19,7 @@ use super::{FINEST, dilation};
 use crate::block::cells::CellBox;
 use crate::math::{Aabb, wide};
 use crate::prim::Shape;
-use crate::ray::{PreparedRay, Ray};
+use crate::ray::{Extent, PreparedRay, Ray};
 use crate::simd::Scalar;
 
 /// A box that may be flat, far from zero, or both.
@@ -75,7 +75,7 @@ pub(super) fn ray_to(random: &mut Random, aabb: &Aabb) -> Option<PreparedRay> {
         let k = random.below(3);
         direction[k] *= [0.0, 1e-9, 1e-13, 1e-20][random.below(4)];
     }
-    Ray::new(origin, direction).prepare(aabb.reach())
+    Ray::new(origin, direction).prepare(Extent::new(aabb.reach(), 1))
 }
 
 /// A ray without error in the cells of a grid, turned as the walk turns it.

@@ -247,6 +247,7 @@ impl InstanceRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ray::Extent;
     use crate::simd::{self, Kernel, Scalar};
 
     #[test]
@@ -278,7 +279,9 @@ mod tests {
                 match expected {
                     Some(expected) => assert_eq!(mapped.map(bits), Some(bits(&expected))),
                     // Whoever is asked about it finds out.
-                    None => assert!(mapped.is_none_or(|ray| ray.prepare(1.0).is_none())),
+                    None => {
+                        assert!(mapped.is_none_or(|ray| ray.prepare(Extent::new(1.0, 1)).is_none()))
+                    }
                 }
             }
         }

@@ -64,7 +64,7 @@ pub(super) fn instance_of(index: &Block, leaf: ChildRef) -> Option<u32> {
 /// for rays from far away where the index is a list or a grid.
 #[cold]
 fn visit_all(level: &Level, ray: &Ray, widening: f64, visit: &mut Visit) {
-    let Some(prepared) = ray.prepare(level.index.header().reach) else { return };
+    let Some(prepared) = ray.prepare(level.index.header().extent()) else { return };
     let mut near = Near::new(&prepared, widening);
     for number in 0..level.instances.len() as u32 {
         if near.reaches(level, number) {
@@ -133,14 +133,14 @@ impl<W: Watch> Kernel for Reaching<'_, '_, '_, W> {
     fn run<S: Simd>(self, s: S) -> Option<()> {
         let Reaching { level, ray, widening, visit, watch } = self;
         let block = &level.index.parts();
-        let (late, slab) = ray.set_out(s, block.header.reach)?;
+        let (late, slab) = ray.set_out(s, block.header.extent())?;
         let slab = if widening > 0.0 { slab.widened(widening) } else { slab };
         // Where each instance is a leaf its box was tested on the way.
         let alone = !matches!(block.bundles, Bundles::None);
         let near = (!alone).then(|| Near::new(&late.prepare(), f64::from(widening)));
         let (t_bound, t_scale) = (late.t_max, late.t_scale());
         let mut query =
-            Reach { level, visit, t_bound, t_scale, near, visited: [NONE; MAILBOX], watch };
+            Extent { level, visit, t_bound, t_scale, near, visited: [NONE; MAILBOX], watch };
         trace(s, block.whole, (&late, &mut None), &slab, &mut query);
         Some(())
     }
@@ -150,7 +150,7 @@ impl<W: Watch> Kernel for Reaching<'_, '_, '_, W> {
 const MAILBOX: usize = 32;
 
 /// The query that calls back for instances.
-pub(super) struct Reach<'a, 'm, 'v, W> {
+pub(super) struct Extent<'a, 'm, 'v, W> {
     level: &'a Level<'m>,
     visit: &'a mut Visit<'v>,
     t_bound: f32,
@@ -160,7 +160,7 @@ pub(super) struct Reach<'a, 'm, 'v, W> {
     watch: W,
 }
 
-impl<W: Watch> Query for Reach<'_, '_, '_, W> {
+impl<W: Watch> Query for Extent<'_, '_, '_, W> {
     type Watch = W;
     // The same instances for every backend, for the sake of the watertight mode.
     const ANY_BOXES: bool = false;

@@ -93,7 +93,7 @@ impl Kernel for Gather<'_, '_> {
         let mut first = 0;
         while first < rays.len() {
             let (rays, stops) = (&rays[first..], &mut stops[first..]);
-            let alike = Alike::first_of(s, rays, index.header.reach);
+            let alike = Alike::first_of(s, rays, index.header.extent());
             if let Some((alike, count)) = alike
                 && gatherer.together(s, alike, &rays[..count], stops)
             {
@@ -121,7 +121,7 @@ impl Gatherer<'_, '_> {
     fn alone<S: Simd>(&mut self, s: S, ray: &Ray, stops: &mut Stops) {
         if let Bundles::Sixteen(bundles) = self.index.bundles
             && is_calm(self.level, ray)
-            && let Some((late, slab)) = ray.set_out(s, self.index.header.reach)
+            && let Some((late, slab)) = ray.set_out(s, self.index.header.extent())
             && self.found.all(s, bundles, &slab.wide::<S, 16>(s), late.t_max)
         {
             let t_scale = late.t_scale();

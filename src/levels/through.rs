@@ -3,7 +3,7 @@
 use core::hint::black_box;
 
 use super::World;
-use super::reach::{Reach, instance_of, is_calm, visit_reached};
+use super::reach::{Extent, instance_of, is_calm, visit_reached};
 use crate::block::Bundles;
 use crate::block::level::Level;
 use crate::bvh::{Columns, ENOUGH_ROOM, Walk};
@@ -84,7 +84,7 @@ fn walk<S: Simd>(
     if !is_calm(level, ray) {
         return None;
     }
-    let (late, slab) = ray.set_out(s, index.header.reach)?;
+    let (late, slab) = ray.set_out(s, index.header.extent())?;
     let t_scale = late.t_scale();
     let in_frame = |limit: f32| f32_above(f64::from(limit) * t_scale);
     let (mut limit, mut t_bound) = (limit, late.t_max);
@@ -101,7 +101,7 @@ fn walk<S: Simd>(
             while !walk.at().is_leaf() {
                 let bundle = bundles.get(walk.at().bundle_number());
                 let entered = bundle.is_some_and(|bundle| {
-                    walk.enter::<S, Reach<'_, '_, '_, ()>, 16>(s, bundle, &boxes, t_bounds)
+                    walk.enter::<S, Extent<'_, '_, '_, ()>, 16>(s, bundle, &boxes, t_bounds)
                 });
                 if !entered {
                     return Some(());

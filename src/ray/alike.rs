@@ -1,7 +1,8 @@
 //! What rays have in common that are traced together.
 
 use super::Ray;
-use super::exponents::{FAR, is_ordinary, scale_below};
+use super::exponents::{is_ordinary, scale_below};
+use super::extent::Extent;
 use super::packet::GROUPS;
 use crate::simd::{Lanes, Width};
 
@@ -31,15 +32,15 @@ pub(crate) struct Alike {
 
 impl Alike {
     /// What the first of these rays have in common, and how many these are: 16, 32, 48 or 64, or all; `None` if not even 16 had better
-    /// go together. `reach` is the largest coordinate of the scene.
+    /// go together.
     #[inline(always)]
-    pub fn first_of<S: Width<8>>(s: S, rays: &[Ray], reach: f32) -> Option<(Self, usize)> {
+    pub fn first_of<S: Width<8>>(s: S, rays: &[Ray], extent: Extent) -> Option<(Self, usize)> {
         let mut known = None;
         let mut extremes: Option<Extremes<S::V>> = None;
         let mut count = 0;
         for part in rays.chunks(16).take(GROUPS) {
             let Some(more) = Extremes::of(s, part, extremes) else { break };
-            let Some(alike) = Alike::within(more.stored(), reach) else { break };
+            let Some(alike) = Alike::within(more.stored(), extent) else { break };
             count += part.len();
             (known, extremes) = (Some((alike, count)), Some(more));
         }
@@ -48,11 +49,11 @@ impl Alike {
 
     /// What rays have in common whose numbers lie within these.
     #[inline(always)]
-    fn within([least, most]: [[f32; 8]; 2], reach: f32) -> Option<Self> {
+    fn within([least, most]: [[f32; 8]; 2], extent: Extent) -> Option<Self> {
         let ([o_least, d_least], [o_most, d_most]) =
             ([&least[..3], &least[4..7]], [&most[..3], &most[4..7]]);
         let (mut apart, mut asunder, mut longest, mut depth) = (0f32, 0f32, 0f32, 0);
-        let (mut farthest, mut one_way) = (reach, true);
+        let (mut farthest, mut one_way) = (extent.scene, true);
         for k in 0..3 {
             apart = apart.max(o_most[k] - o_least[k]);
             asunder = asunder.max(d_most[k] - d_least[k]);
@@ -61,9 +62,9 @@ impl Alike {
             (longest, depth) = if size > longest { (size, k) } else { (longest, depth) };
             one_way &= d_least[k] > 0.0 || d_most[k] < 0.0;
         }
-        let near = asunder <= ASUNDER * longest && apart <= APART * reach;
+        let near = asunder <= ASUNDER * longest && apart <= APART * extent.scene;
         let ordinary = is_ordinary(0.5 * longest) && is_ordinary(longest) && is_ordinary(farthest);
-        let ordinary = ordinary && farthest <= FAR * reach;
+        let ordinary = ordinary && farthest <= extent.near;
         if !(one_way && near && ordinary) {
             return None;
         }

@@ -6,10 +6,13 @@ use raykern_harness::make::Random;
 use raykern_harness::oracle::dyadic::Dyadic;
 use raykern_harness::search::{Worst, samples};
 
-use super::{FrameSlab, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
+use super::{Extent, FrameSlab, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
 use crate::math::rounding::{f32_above, f32_below};
 use crate::math::{Aabb, wide};
 use crate::simd::Scalar;
+
+/// As in a large scene, where rays are soonest far outside.
+const PRIMS: u32 = u32::MAX;
 
 const RANGES: [[i32; 2]; 5] = [[-149, 127], [-149, -120], [60, 127], [-20, 20], [-2, 2]];
 
@@ -28,14 +31,15 @@ fn ray(random: &mut Random) -> Option<(PreparedRay, f32)> {
     let ray = Ray::new(origin, direction.map(|x| x * length));
     let reach = random.wild(range).abs();
     let reach = if random.below(2) == 0 { reach } else { 0.0 };
-    let ray = ray.with_limits(f32::NEG_INFINITY, f32::INFINITY).prepare(reach)?;
+    let ray =
+        ray.with_limits(f32::NEG_INFINITY, f32::INFINITY).prepare(Extent::new(reach, PRIMS))?;
     let reach = ray.given.origin.iter().fold(reach, |m, x| m.max(x.abs()));
     Some((ray, reach))
 }
 
 /// The ray for boxes in `f32`, if it is an ordinary one.
 fn narrow(ray: &PreparedRay, reach: f32) -> Option<NarrowSlab> {
-    ray.given.prepare_with(Scalar, reach).map(|(_, slab)| slab)
+    ray.given.prepare_with(Scalar, Extent::new(reach, PRIMS)).map(|(_, slab)| slab)
 }
 
 /// A wall within reach, of any exponent.
@@ -97,7 +101,7 @@ fn boxes_hold(random: &mut Random, ray: &PreparedRay, reach: f32) -> bool {
         })
     };
     let narrow = narrow(ray, reach);
-    let framed = FrameSlab::new(ray, reach);
+    let framed = FrameSlab::new(ray, Extent::new(reach, PRIMS));
     holds(&|bound| WideSlab::new(ray).part(aabb.corners(), bound))
         && holds(&|bound| framed.part(aabb.corners(), bound))
         && narrow.is_none_or(|slab| holds(&|bound| slab.part(aabb.corners(), bound)))
@@ -121,7 +125,7 @@ fn narrow_boxes() {
 }
 
 /// A ray that begins far outside, and a point on it in a scene that reaches not much farther than that.
-fn far_ray(random: &mut Random) -> Option<(PreparedRay, f32, [f64; 3], f64)> {
+fn far_ray(random: &mut Random) -> Option<(PreparedRay, Extent, [f64; 3], f64)> {
     let axis = random.below(3);
     let mut direction = [0, 1, 2].map(|_| random.wild([-2, 2]));
     let mut origin = [0, 1, 2].map(|_| random.wild([-2, 2]));
@@ -143,7 +147,8 @@ fn far_ray(random: &mut Random) -> Option<(PreparedRay, f32, [f64; 3], f64)> {
     let point = [0, 1, 2].map(|k| o[k] + d[k] * t);
     let reach = point.iter().fold(0.0, |m: f64, x| m.max(x.abs())) * random.between(1.0, 9.0);
     let ray = Ray::new(origin, direction).with_limits(f32::NEG_INFINITY, f32::INFINITY);
-    Some((ray.prepare(reach as f32)?, reach as f32, point, t))
+    let extent = Extent::new(reach as f32, PRIMS);
+    Some((ray.prepare(extent)?, extent, point, t))
 }
 
 /// Boxes around such points, as small as floats allow.
@@ -151,10 +156,10 @@ fn far_ray(random: &mut Random) -> Option<(PreparedRay, f32, [f64; 3], f64)> {
 fn boxes_of_far_rays() {
     const SEED: u64 = 23;
     println!("seed {SEED}");
-    let (mut random, mut far) = (Random::new(SEED), 0);
+    let (mut random, mut far, mut beside) = (Random::new(SEED), 0, 0);
     for sample in 0..samples(300_000) {
-        let Some((ray, reach, point, t)) = far_ray(&mut random) else { continue };
-        far += u32::from(ray.given.prepare_with(Scalar, reach).is_none());
+        let Some((ray, extent, point, t)) = far_ray(&mut random) else { continue };
+        far += u32::from(ray.given.prepare_with(Scalar, extent).is_none());
         let mut aabb = Aabb::EMPTY;
         for (k, x) in point.into_iter().enumerate() {
             let step = f64::from(ray.given.direction[k]) * t;
@@ -162,32 +167,35 @@ fn boxes_of_far_rays() {
             (aabb.lower[k], aabb.upper[k]) = (f32_below(x - off), f32_above(x + off));
         }
         let t = t * ray.t_scale;
-        let framed = FrameSlab::new(&ray, reach.max(aabb.reach()));
+        let reach = extent.scene.max(aabb.reach());
+        let framed = FrameSlab::new(&ray, Extent::new(reach, PRIMS));
         for bound in [f32_above(t), ray.t_max] {
             let part = framed.part(aabb.corners(), bound);
             let holds = f64::from(part.near) <= t && t <= f64::from(part.far);
             assert!(holds, "sample {sample} of seed {SEED}: {ray:?} {aabb:?} {t} {part:?}");
         }
-        let beside = (0..3).find(|k| aabb.reach() < 0.1 * reach && ray.given.direction[*k] != 0.0);
         // What is clearly beside the ray is left out, or all of this would be in vain.
-        if let Some(k) = beside.filter(|_| far_enough(&ray, reach)) {
-            let mut moved = aabb;
-            let other = (k + 1) % 3;
-            (moved.lower[other], moved.upper[other]) = (reach, reach);
-            let (lower, upper) = (moved.lower, moved.upper);
-            let part = WideSlab::new(&ray).part([&lower, &upper], ray.t_max);
-            if part.is_empty() {
-                assert!(framed.part([&lower, &upper], ray.t_max).is_empty(), "{ray:?} {moved:?}");
+        if far_enough(&ray, extent) && aabb.reach() < 0.1 * extent.scene {
+            for k in 0..3 {
+                let mut moved = aabb;
+                (moved.lower[k], moved.upper[k]) = (extent.scene, extent.scene);
+                let Aabb { lower, upper } = moved;
+                if WideSlab::new(&ray).part([&lower, &upper], ray.t_max).is_empty() {
+                    let part = framed.part([&lower, &upper], ray.t_max);
+                    assert!(part.is_empty(), "{ray:?} {moved:?}");
+                    beside += 1;
+                }
             }
         }
     }
+    assert!(beside > 10_000, "{beside} boxes beside");
     assert!(far > 10_000, "{far} rays from far outside");
 }
 
 /// Whether a ray begins far outside, but not so far that its own numbers tell less than a hundredth of the scene.
-fn far_enough(ray: &PreparedRay, reach: f32) -> bool {
+fn far_enough(ray: &PreparedRay, extent: Extent) -> bool {
     let farthest = ray.given.origin.iter().fold(0f32, |m, x| m.max(x.abs()));
-    farthest > 8192.0 * reach && farthest < 1e12 * reach
+    farthest > extent.near && farthest < 1e12 * extent.scene
 }
 
 /// `(wall - o) * inverse` against the quotient, without error: `x d` against `(wall - o) t_scale`.

@@ -7,10 +7,6 @@ use crate::simd::{Lanes, SMALL, Simd, Width};
 /// Ordinary scenes, origins and directions are smaller than this, and not all smaller than its reciprocal.
 pub(super) const ORDINARY: f32 = (1u64 << 60) as f32;
 
-/// An ordinary ray does not begin farther out than so many times what its scene reaches: boxes are padded by what `f32` may be off
-/// at its origin, so from much farther all of them would be met.
-pub(super) const FAR: f32 = 8192.0;
-
 #[inline(always)]
 pub(super) fn is_ordinary(x: f32) -> bool {
     (1.0 / ORDINARY..ORDINARY).contains(&x)

@@ -1,6 +1,7 @@
 //! Any ray against boxes in `f32`, also one that begins far outside.
 
-use super::exponents::{FAR, is_ordinary, largest_bits};
+use super::exponents::{is_ordinary, largest_bits};
+use super::extent::Extent;
 use super::frame::{SLOWEST, TINY};
 use super::slab::{Scales, Slab, WideBoxes, walls, wider};
 use super::{Interval, PreparedRay};
@@ -12,7 +13,7 @@ use crate::simd::{SMALL, Scalar, Width};
 ///
 /// What a wall loses by that is below 2^-149 of what it is padded by. A wall that is infinite stays so.
 ///
-/// A ray that begins [far](FAR) outside is followed from near the scene on, or all of that would be within what a wall is padded by.
+/// A ray that begins [far outside](Extent) is followed from near the scene on, or all of that would be within what a wall is padded by.
 #[derive(Clone, Copy)]
 pub(crate) struct FrameSlab {
     /// Of each axis the reciprocal, with the sign of the direction, and the shifts of near and far walls: see
@@ -25,15 +26,15 @@ pub(crate) struct FrameSlab {
 }
 
 impl FrameSlab {
-    /// For boxes within `reach`, of which infinity says nothing.
+    /// For boxes within `extent`, of which infinity says nothing.
     #[inline(never)]
-    pub fn new(ray: &PreparedRay, reach: f32) -> Self {
+    pub fn new(ray: &PreparedRay, extent: Extent) -> Self {
         let PreparedRay { given, scale, direction, t_min, .. } = ray;
-        let scene = if reach < f32::MAX { larger(0.0, reach) } else { f32::MAX };
+        let scene = if extent.scene < f32::MAX { larger(0.0, extent.scene) } else { f32::MAX };
         let farthest = f32::from_bits(largest_bits(&given.origin));
+        let is_far = !SMALL && farthest > extent.near;
         let reach = larger(scene, farthest);
         let is_ordinary = is_ordinary(reach);
-        let is_far = !SMALL && farthest > scene * FAR;
         let near =
             if is_far { Nearer::new(ray, scene) } else { Nearer::origin(ray, reach * scale) };
         let scales = Scales { t: [1.0], space: [1.0], reach: [near.reach] };

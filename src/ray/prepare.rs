@@ -1,9 +1,9 @@
 //! From a ray as it is given to one that is prepared, in two steps: boxes can be tested before primitives.
 
 use super::exponents::{
-    EXPONENT, FAR, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded,
-    scales_below,
+    EXPONENT, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded, scales_below,
 };
+use super::extent::Extent;
 use super::frame::{PreparedRay, SLOWEST, Shear, TINY};
 use super::slab::{NarrowSlab, Scales};
 use super::{Axis, Ray};
@@ -32,14 +32,17 @@ impl Ray {
     }
 
     /// What boxes need of an ordinary ray, and what the rest follows from. `None` for a ray that hits nothing by
-    /// definition, for those at the ends of the floats, and for those that begin [far](FAR) outside. `reach` is the largest
-    /// coordinate of the scene, infinite if it is not representable.
+    /// definition, for those at the ends of the floats, and for those that begin [far outside](Extent).
     ///
     /// What all rays wait for is the way over the reciprocals to the first boxes; so division waits for nothing, the frame is
     /// found meanwhile, and both meet behind it. All is done in vectors, also what is one number, and
     /// all doubts are one question: every ray comes here, and many only to find that it hits nothing.
     #[inline(always)]
-    pub(crate) fn set_out<S: Simd>(&self, s: S, reach: f32) -> Option<(LateRay<S>, NarrowSlab)> {
+    pub(crate) fn set_out<S: Simd>(
+        &self,
+        s: S,
+        extent: Extent,
+    ) -> Option<(LateRay<S>, NarrowSlab)> {
         let splat = |x: f32| Width::<4>::splat(s, x);
         let [from, along] = self.rows();
         // Not the reciprocal of a limit, which may be a subnormal number: that takes some processors very long.
@@ -51,8 +54,8 @@ impl Ray {
         let distance = o.abs();
         let fastest = s.largest_of_three(speed);
         let most = splat(ORDINARY);
-        let near = splat(reach * FAR).min(most);
-        let reach = s.largest_of_three(distance).max(splat(reach));
+        let near = splat(extent.near).min(most);
+        let reach = s.largest_of_three(distance).max(splat(extent.scene));
         // These comparisons refuse a NaN, which may have been lost above.
         let least = splat(1.0 / ORDINARY).less_or_equal(fastest.min(reach));
         let sound = distance.less_or_equal(near) & speed.less(most) & reach.less(most) & least;
@@ -78,20 +81,20 @@ impl Ray {
     pub(crate) fn prepare_with<S: Simd>(
         &self,
         s: S,
-        reach: f32,
+        extent: Extent,
     ) -> Option<(PreparedRay, NarrowSlab)> {
-        let (ray, slab) = self.set_out(s, reach)?;
+        let (ray, slab) = self.set_out(s, extent)?;
         Some((ray.prepare(), slab))
     }
 
     /// The same without boxes, of any ray that can hit something.
-    pub(crate) fn prepare(&self, reach: f32) -> Option<PreparedRay> {
+    pub(crate) fn prepare(&self, extent: Extent) -> Option<PreparedRay> {
         if SMALL {
-            return self.prepare_any(reach);
+            return self.prepare_any(extent.scene);
         }
-        match self.prepare_with(Scalar, reach) {
+        match self.prepare_with(Scalar, extent) {
             Some((ray, _)) => Some(ray),
-            None => self.prepare_any(reach),
+            None => self.prepare_any(extent.scene),
         }
     }
 
@@ -251,7 +254,7 @@ mod tests {
         type Output = Option<PreparedRay>;
 
         fn run<S: Simd>(self, s: S) -> Self::Output {
-            self.0.prepare_with(s, 3.0).map(|(ray, _)| ray)
+            self.0.prepare_with(s, Extent::new(3.0, 1)).map(|(ray, _)| ray)
         }
     }
 
@@ -278,7 +281,7 @@ mod tests {
     #[test]
     fn rays_that_hit_nothing_are_not_prepared() {
         let good = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
-        assert!(good.prepare(1.0).is_some());
+        assert!(good.prepare(Extent::new(1.0, 1)).is_some());
         for bad in [
             Ray { origin: [f32::NAN, 0.0, 0.0], ..good },
             Ray { origin: [0.0, f32::INFINITY, 0.0], ..good },
@@ -290,10 +293,14 @@ mod tests {
             good.with_limits(2.0, 1.0),
             good.with_limits(f32::INFINITY, f32::INFINITY),
         ] {
-            assert!(bad.prepare(1.0).is_none(), "{bad:?}");
+            assert!(bad.prepare(Extent::new(1.0, 1)).is_none(), "{bad:?}");
         }
-        assert!(good.with_limits(1.0, 1.0).prepare(1.0).is_some());
-        assert!(good.with_limits(f32::NEG_INFINITY, f32::INFINITY).prepare(1.0).is_some());
+        assert!(good.with_limits(1.0, 1.0).prepare(Extent::new(1.0, 1)).is_some());
+        assert!(
+            good.with_limits(f32::NEG_INFINITY, f32::INFINITY)
+                .prepare(Extent::new(1.0, 1))
+                .is_some()
+        );
     }
 
     fn three([x, y, z, _]: [f32; 4]) -> [f32; 3] {
@@ -307,7 +314,7 @@ mod tests {
             for reach in sizes.into_iter().chain([0.0, f32::INFINITY]) {
                 for length in sizes {
                     let ray = Ray::new([origin, 0.0, -origin], [length, -length / 3.0, 0.0]);
-                    let ray = ray.prepare(reach).expect("a valid ray");
+                    let ray = ray.prepare(Extent::new(reach, 1)).expect("a valid ray");
                     let longest = f32::from_bits(largest_bits(&three(ray.direction)));
                     assert!((1.0..2.0).contains(&longest), "{length} {longest}");
                     let size = origin.max(reach);
@@ -333,7 +340,8 @@ mod tests {
             ([-5.0, 4.0, -3.0], [1, 2, 0], -1.0),
             ([2.0, 2.0, 2.0], [0, 1, 2], 1.0),
         ] {
-            let shear = Ray::new([0.0; 3], direction).prepare(1.0).expect("a ray").shear;
+            let shear =
+                Ray::new([0.0; 3], direction).prepare(Extent::new(1.0, 1)).expect("a ray").shear;
             assert_eq!(
                 (shear.axes.map(|axis| axis as usize), shear.depth_scale.signum()),
                 (axes, sign),

@@ -345,14 +345,15 @@ impl<L: Slab, S: Width<N>, const N: usize> WideBoxes<S, N> for (&L, S) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::Ray;
+    use crate::ray::{Extent, Ray};
     use crate::simd::Scalar;
 
     const UNIT_BOX: Aabb = Aabb { lower: [0.0; 3], upper: [1.0; 3] };
 
     fn parts(ray: Ray) -> [Interval<f32>; 2] {
-        let ray = ray.prepare(1.0).expect("a valid ray");
-        let (_, narrow) = ray.given.prepare_with(Scalar, 1.0).expect("an ordinary ray");
+        let ray = ray.prepare(Extent::new(1.0, 1)).expect("a valid ray");
+        let (_, narrow) =
+            ray.given.prepare_with(Scalar, Extent::new(1.0, 1)).expect("an ordinary ray");
         // In given units, as the frame's are twice as long or half.
         let corners = UNIT_BOX.corners();
         [narrow.part(corners, ray.t_max), WideSlab::new(&ray).part(corners, ray.t_max)].map(
@@ -400,8 +401,12 @@ mod tests {
                 Ray::new([size, 0.0, 0.0], [0.0, size, 1e-3 * size]),
                 Ray::new([0.0, 0.0, size], [0.0, size, size]),
             ] {
-                assert!(ray.prepare(size).is_some());
-                assert_eq!(ray.prepare_with(Scalar, size).is_some(), narrow, "{size}");
+                assert!(ray.prepare(Extent::new(size, 1)).is_some());
+                assert_eq!(
+                    ray.prepare_with(Scalar, Extent::new(size, 1)).is_some(),
+                    narrow,
+                    "{size}"
+                );
             }
         }
     }

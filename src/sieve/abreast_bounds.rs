@@ -11,7 +11,7 @@ use crate::block::leaf::TriangleBlock;
 use crate::exact::{Line, Meeting};
 use crate::interval;
 use crate::math::Aabb;
-use crate::ray::{Alike, Ray, RayPacket};
+use crate::ray::{Alike, Extent, Ray, RayPacket};
 use crate::simd::Scalar;
 
 /// A packet of rays from nearly one place, each to somewhere on the triangle or beside it, not far from each other.
@@ -35,7 +35,9 @@ fn packet_is_right(random: &mut Random, worst: &mut Worst) -> Result<u32, u32> {
     let ([origin, a, b, c], reach) = points(random);
     let corners = [a, b, c];
     let rays = packet(random, origin, corners);
-    let Some((alike, 16)) = Alike::first_of(Scalar, &rays, reach) else { return Ok(0) };
+    let Some((alike, 16)) = Alike::first_of(Scalar, &rays, Extent::new(reach, 1)) else {
+        return Ok(0);
+    };
     if !interval::triangle::has_area(corners) {
         return Ok(0);
     }
@@ -65,7 +67,7 @@ fn packet_is_right(random: &mut Random, worst: &mut Worst) -> Result<u32, u32> {
     let mut hits = 0;
     for (i, ray) in rays.iter().enumerate() {
         let line = Line { origin: ray.origin, direction: ray.direction };
-        let Some(prepared) = ray.prepare(reach) else { continue };
+        let Some(prepared) = ray.prepare(Extent::new(reach, 1)) else { continue };
         let met = interval::triangle::meet(&line, &corners)
             .map(|(met, _)| met)
             .filter(|_| is_within(&line, &Meeting::Triangle(corners), &prepared));

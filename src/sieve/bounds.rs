@@ -14,7 +14,7 @@ use super::triangle::single::{Sieved, area, area_error, coordinate_error, sheare
 use crate::exact::{Distance, Line, Meeting};
 use crate::interval;
 use crate::math::{sum_abs, wide};
-use crate::ray::{Interval, PreparedRay, Ray};
+use crate::ray::{Extent, Interval, PreparedRay, Ray};
 
 /// Exponents of coordinates: all, either end, ordinary ones, and nearly one size.
 const RANGES: [[i32; 2]; 6] = [[-149, 127], [-149, -120], [100, 127], [-20, 20], [-2, 2], [-2, 2]];
@@ -103,10 +103,13 @@ fn triangle_is_right(random: &mut Random, worst: &mut TriangleWorst) -> bool {
     let ray = aimed(random, origin, target);
     let line = Line { origin, direction: ray.direction };
     let met = ray
-        .prepare(reach)
+        .prepare(Extent::new(reach, 1))
         .and_then(|_| interval::triangle::meet(&line, &corners))
         .map(|(met, _)| met);
-    let Some(ray) = limited(random, ray, met.map(|met| met.t)).prepare(reach) else { return true };
+    let Some(ray) = limited(random, ray, met.map(|met| met.t)).prepare(Extent::new(reach, 1))
+    else {
+        return true;
+    };
     let far = met.map(|met| ray.t_above(met.t, met.t_error * 1.01));
     let bound = far.filter(|_| random.below(2) == 0).unwrap_or(ray.t_max).min(ray.t_max);
     let sieved = sieve(&ray, bound, corners);
@@ -235,10 +238,10 @@ fn sphere_is_right(random: &mut Random, worst: &mut SphereWorst) -> bool {
     let ray = aimed(random, origin, target);
     let reach = reach.max(sphere_reach(centre, radius));
     let line = Line { origin, direction: ray.direction };
-    let Some(_) = ray.prepare(reach) else { return true };
+    let Some(_) = ray.prepare(Extent::new(reach, 1)) else { return true };
     let met = interval::sphere::meet(&line, centre, radius);
     let t = met.map(|met| met.t[random.below(2)]);
-    let Some(ray) = limited(random, ray, t).prepare(reach) else { return true };
+    let Some(ray) = limited(random, ray, t).prepare(Extent::new(reach, 1)) else { return true };
     let lane = sphere(&ray, ray.t_max, centre, radius);
     let scale = f64::from(ray.scale);
     let (v, d) = ((wide(origin) - wide(centre)) * scale, wide(ray.given.direction));
@@ -290,13 +293,15 @@ fn below_the_least_float_of_the_frame_nothing_is_rejected() {
     let at = |x: f32, y: f32| [x * 2f32.powi(90), y * 2f32.powi(90), 1.5 * unit];
     let corners = [at(-1.0, -1.0), at(1.0, -1.0), at(0.0, 1.0)];
     let ray = Ray::new([0.0, 0.0, 0.5 * unit], [0.0, 0.0, 1.0]);
-    let prepared = ray.with_limits(0.0, unit).prepare(2f32.powi(99)).expect("a ray");
+    let prepared =
+        ray.with_limits(0.0, unit).prepare(Extent::new(2f32.powi(99), 1)).expect("a ray");
     let line = Line { origin: ray.origin, direction: ray.direction };
     assert!(is_within(&line, &Meeting::Triangle(corners), &prepared));
     let sieved = sieve(&prepared, prepared.t_max, corners);
     assert!(!sieved.rejected);
 
-    let prepared = ray.with_limits(0.0, 0.75 * unit).prepare(2f32.powi(99)).expect("a ray");
+    let prepared =
+        ray.with_limits(0.0, 0.75 * unit).prepare(Extent::new(2f32.powi(99), 1)).expect("a ray");
     assert!(sphere(&prepared, prepared.t_max, [0.0, 0.0, 1.5 * unit], 0.4 * unit).is_some());
 }
 
@@ -307,7 +312,8 @@ fn infinite_limits_are_surely_kept() {
     for direction in [[0.0, 0.0, -1.5], [1e-3, 1e-3, -1.5], [0.0, 0.0, -1e4]] {
         let ray = Ray::new([0.003, 0.003, 0.01], direction);
         for t_min in [0.0, f32::NEG_INFINITY] {
-            let ray = ray.with_limits(t_min, f32::INFINITY).prepare(0.01).expect("a ray");
+            let ray =
+                ray.with_limits(t_min, f32::INFINITY).prepare(Extent::new(0.01, 1)).expect("a ray");
             let sieved = sieve(&ray, ray.t_max, corners);
             assert!(!sieved.rejected && sieved.sure && sieved.inside, "{direction:?} {t_min}");
         }

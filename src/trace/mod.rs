@@ -75,8 +75,8 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
     #[inline(always)]
     fn run<S: Simd>(self, s: S) -> Q::Answer {
         let Ask { block, ray, question } = self;
-        let reach = block.header().reach;
-        let Some((late, slab)) = ray.set_out(s, reach) else {
+        let extent = block.header().extent();
+        let Some((late, slab)) = ray.set_out(s, extent) else {
             // A copy is lent: what was made by parts, as in an instance, had better not go through memory.
             let ray = *ray;
             return ask_any(block, &ray, question);
@@ -95,12 +95,12 @@ impl<'m, Q: Question<'m>> Kernel for Ask<'_, 'm, Q> {
 #[cold]
 #[inline(never)]
 fn ask_any<'m, Q: Question<'m>>(block: Finished<'m>, ray: &Ray, question: Q) -> Q::Answer {
-    let reach = block.header().reach;
+    let extent = block.header().extent();
     // Where it is: a copy would be another kind of call, and twice the room.
-    let mut prepared = ray.prepare_any(reach);
+    let mut prepared = ray.prepare_any(extent.scene);
     let Some(ray) = &prepared else { return Q::nothing() };
     let mut query = question.query(block, ray.t_max);
-    let slab = FrameSlab::new(ray, reach);
+    let slab = FrameSlab::new(ray, extent);
     // Those who add up stacks do not see through pointers.
     let ended = match Q::Query::ORDERED {
         _ if SMALL => trace(Scalar, block, (&Early, &mut prepared), &slab, &mut query),
