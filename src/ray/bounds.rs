@@ -145,7 +145,7 @@ fn far_ray(random: &mut Random) -> Option<(PreparedRay, Extent, [f64; 3], f64)> 
     let t = -o.dot(d) / d.dot(d);
     let t = t * (1.0 + random.between(-1.0, 1.0) * 2f64.powi(-(20 + random.below(30) as i32)));
     let point = [0, 1, 2].map(|k| o[k] + d[k] * t);
-    let reach = point.iter().fold(0.0, |m: f64, x| m.max(x.abs())) * random.between(1.0, 9.0);
+    let reach = point.iter().fold(0.0, |m: f64, x| m.max(x.abs())) * random.between(1.0, 90.0);
     let ray = Ray::new(origin, direction).with_limits(f32::NEG_INFINITY, f32::INFINITY);
     let extent = Extent::new(reach as f32, PRIMS);
     Some((ray.prepare(extent)?, extent, point, t))
