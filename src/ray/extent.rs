@@ -19,8 +19,8 @@ impl Extent {
     /// scene's size on, as measured in `docs/METHODS.md`.
     #[inline(always)]
     pub fn new(scene: f32, prims: u32) -> Self {
-        let digits = u32::BITS - prims.leading_zeros();
-        let times = f32::from_bits((127 + 23 - 3 * digits / 8) << 23);
+        // Three eighths of an exponent for each bit that `n` has less; what is no whole exponent goes on into the fraction.
+        let times = f32::from_bits((138 << 23) + prims.leading_zeros() * (3 << 20));
         // Those who are small have no such way.
         Extent { scene, near: if SMALL { f32::INFINITY } else { scene * times } }
     }
@@ -32,11 +32,10 @@ mod tests {
 
     #[test]
     fn the_more_there_is_the_sooner_a_ray_is_far_outside() {
-        for (prims, near) in [(0, 23), (12, 22), (200, 20), (2_000, 19), (20_000, 18)] {
-            assert_eq!(Extent::new(0.5, prims).near, 2f32.powi(near - 1), "{prims}");
-        }
-        for (prims, near) in [(500_000, 16), (10_000_000, 14), (u32::MAX, 11)] {
-            assert_eq!(Extent::new(0.5, prims).near, 2f32.powi(near - 1), "{prims}");
+        for prims in (0..=32).map(|digits| (1u64 << digits) - 1) {
+            let near = Extent::new(0.5, prims as u32).near;
+            let exact = 0.5 * 2f64.powi(23) * ((prims + 1) as f64).powf(-0.375);
+            assert!((0.999..1.1).contains(&(f64::from(near) / exact)), "{prims}: {near} {exact}");
         }
         assert_eq!(Extent::new(f32::INFINITY, 7).near, f32::INFINITY);
     }
