@@ -30,8 +30,7 @@ use cells::{GridHead, Run};
 use leaf::{SphereBlock, TriangleBlock};
 
 use crate::kinds::{BALLS, GRID, REFIT, WIDE};
-use crate::math::Aabb;
-use crate::ray::Extent;
+use crate::math::{Aabb, Extent};
 use crate::storage::{self, ALIGNMENT, Plain, align_up};
 
 const MAGIC: [u8; 8] = *b"raykern\0";

@@ -17,9 +17,9 @@ use super::steps::Level;
 use super::way::time_above;
 use super::{FINEST, dilation};
 use crate::block::cells::CellBox;
-use crate::math::{Aabb, wide};
+use crate::math::{Aabb, Extent, wide};
 use crate::prim::Shape;
-use crate::ray::{Extent, PreparedRay, Ray};
+use crate::ray::{PreparedRay, Ray};
 use crate::simd::Scalar;
 
 /// A box that may be flat, far from zero, or both.

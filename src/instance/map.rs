@@ -247,7 +247,7 @@ impl InstanceRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::Extent;
+    use crate::math::Extent;
     use crate::simd::{self, Kernel, Scalar};
 
     #[test]

@@ -2,8 +2,8 @@
 
 use super::Ray;
 use super::exponents::{is_ordinary, scale_below};
-use super::extent::Extent;
 use super::packet::GROUPS;
+use crate::math::Extent;
 use crate::simd::{Lanes, Width};
 
 /// Fewer rays are not worth it.

@@ -6,9 +6,9 @@ use raykern_harness::make::Random;
 use raykern_harness::oracle::dyadic::Dyadic;
 use raykern_harness::search::{Worst, samples};
 
-use super::{Extent, FrameSlab, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
+use super::{FrameSlab, NarrowSlab, PreparedRay, Ray, Slab, WideSlab};
 use crate::math::rounding::{f32_above, f32_below};
-use crate::math::{Aabb, wide};
+use crate::math::{Aabb, Extent, wide};
 use crate::simd::Scalar;
 
 /// As in a large scene, where rays are soonest far outside.

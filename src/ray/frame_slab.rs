@@ -1,10 +1,10 @@
 //! Any ray against boxes in `f32`, also one that begins far outside.
 
 use super::exponents::{is_ordinary, largest_bits};
-use super::extent::Extent;
 use super::frame::{SLOWEST, TINY};
 use super::slab::{Scales, Slab, WideBoxes, walls, wider};
 use super::{Interval, PreparedRay};
+use crate::math::Extent;
 use crate::math::float::less;
 use crate::math::rounding::{UNIT, UNIT32, f32_above, f32_below};
 use crate::simd::{SMALL, Scalar, Width};

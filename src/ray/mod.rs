@@ -8,7 +8,6 @@ mod axis;
 #[cfg(test)]
 mod bounds;
 mod exponents;
-mod extent;
 mod frame;
 mod frame_slab;
 mod packet;
@@ -18,7 +17,6 @@ mod slab;
 pub(crate) use abreast::{Abreast, Sixteen};
 pub(crate) use alike::Alike;
 pub(crate) use axis::Axis;
-pub(crate) use extent::Extent;
 pub(crate) use frame::{PreparedRay, TINY};
 pub(crate) use frame_slab::FrameSlab;
 pub(crate) use packet::{Entered, GROUPS, RayPacket, Spread};

@@ -3,11 +3,11 @@
 use super::exponents::{
     EXPONENT, ORDINARY, exponent_above, largest_bits, powers, reciprocals, rounded, scales_below,
 };
-use super::extent::Extent;
 use super::frame::{PreparedRay, SLOWEST, Shear, TINY};
 use super::slab::{NarrowSlab, Scales};
 use super::{Axis, Ray};
 use crate::exact::Line;
+use crate::math::Extent;
 use crate::math::float::{narrow_power_of_two, power_of_two};
 use crate::math::rounding::Round;
 use crate::simd::{Lanes, SMALL, Scalar, Simd, Width};

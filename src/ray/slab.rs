@@ -345,7 +345,8 @@ impl<L: Slab, S: Width<N>, const N: usize> WideBoxes<S, N> for (&L, S) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ray::{Extent, Ray};
+    use crate::math::Extent;
+    use crate::ray::Ray;
     use crate::simd::Scalar;
 
     const UNIT_BOX: Aabb = Aabb { lower: [0.0; 3], upper: [1.0; 3] };

@@ -10,8 +10,8 @@ use super::bounds::{is_within, mix, points, weight};
 use crate::block::leaf::TriangleBlock;
 use crate::exact::{Line, Meeting};
 use crate::interval;
-use crate::math::Aabb;
-use crate::ray::{Alike, Extent, Ray, RayPacket};
+use crate::math::{Aabb, Extent};
+use crate::ray::{Alike, Ray, RayPacket};
 use crate::simd::Scalar;
 
 /// A packet of rays from nearly one place, each to somewhere on the triangle or beside it, not far from each other.

@@ -13,8 +13,8 @@ use super::sphere::{chord, sphere};
 use super::triangle::single::{Sieved, area, area_error, coordinate_error, sheared, sieve};
 use crate::exact::{Distance, Line, Meeting};
 use crate::interval;
-use crate::math::{sum_abs, wide};
-use crate::ray::{Extent, Interval, PreparedRay, Ray};
+use crate::math::{Extent, sum_abs, wide};
+use crate::ray::{Interval, PreparedRay, Ray};
 
 /// Exponents of coordinates: all, either end, ordinary ones, and nearly one size.
 const RANGES: [[i32; 2]; 6] = [[-149, 127], [-149, -120], [100, 127], [-20, 20], [-2, 2], [-2, 2]];
