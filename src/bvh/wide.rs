@@ -10,7 +10,7 @@ use crate::simd::{Simd, Width};
 /// Where a ray stands on its way through a tree of bundles.
 ///
 /// A bundle's children that the ray enters go to the stack in the order of their distance, in one step, but for the
-/// nearest, which is next; with one child, the usual case near the leaves, the stack is not touched. The stack is
+/// nearest, which is next; with one child, the usual case near the leaves, nothing comes to the stack. The stack is
 /// culled once for each hit that was accepted, so taking from it tests nothing.
 pub(crate) struct Walk<'m, const ROOM: usize> {
     stack: Stack<'m, ROOM>,
@@ -143,8 +143,8 @@ impl<'m, const ROOM: usize> Walk<'m, ROOM> {
             return true;
         }
         let next = if !ordered {
-            // Without a bound that moves, it does not matter where they are entered; and how many they are is guessed wrong more often
-            // than it matters.
+            // Without a bound that moves, it does not matter where they are entered. One child goes the same way, as a guess whether
+            // there are more is often wrong.
             self.stack.push_but_last(s, mask, &bundle.refs)
         } else if mask.is_power_of_two() {
             Some(bundle.child(mask))
